@@ -55,7 +55,7 @@ const TIGHT: f64 = 1e-9;
 const LOOSE: f64 = 1e-6;
 
 fn tolerance(rtol: f64) -> Tolerance {
-    Tolerance { rtol, atol: 1e-3 * rtol }
+    Tolerance::new(rtol, 1e-3 * rtol)
 }
 
 fn in_context<T>(isa: Isa, work: impl FnOnce(ExecutionContext<'_>) -> T) -> T {

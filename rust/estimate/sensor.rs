@@ -37,7 +37,7 @@ pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
 }
 
 /// How closely the way back to a late sensor's moment is followed.
-const BACK: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
+const BACK: Tolerance = Tolerance::new(1e-8, 1e-10);
 
 /// What a sensor sees; of channels that are late, what it was then. Not a number where the law leads from nowhere to
 /// that moment's state.

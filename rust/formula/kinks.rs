@@ -73,6 +73,8 @@ pub struct Kinks {
     pub surfaces: Vec<Expression>,
     /// Whether a formula jumps there.
     pub jumps: Vec<bool>,
+    /// Whether their functions are linear in the state, and so no faster than it.
+    pub steady: Vec<bool>,
     /// Those that a law may [slide](crate::model::sliding_mode) on: where it jumps at a linear function of the states
     /// in the rate of one of them.
     pub sliding: Vec<usize>,
@@ -129,7 +131,9 @@ impl Kinks {
         if self.surfaces.len() + usize::from(self.clocked) == MAX_SURFACES {
             return None;
         }
-        self.surfaces.push(Expression::of(ops));
+        let own = Expression::of(ops);
+        self.steady.push(own.is_affine());
+        self.surfaces.push(own);
         self.jumps.push(false);
         Some(self.surfaces.len() - 1)
     }

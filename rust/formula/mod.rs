@@ -250,6 +250,17 @@ impl Expression {
             .any(|op| matches!(op, Op::Push(Leaf::Rate(_) | Leaf::State(_) | Leaf::Time | Leaf::Input(_))))
     }
 
+    /// Whether it changes no faster than the state and its rates: it is made of these, parameters and numbers by sums,
+    /// products and low powers.
+    pub fn is_slow(&self) -> bool {
+        self.ops.iter().all(|op| match *op {
+            Op::Push(leaf) => !matches!(leaf, Leaf::Time | Leaf::Input(_)),
+            Op::Unary(Unary::Neg) | Op::Binary(Binary::Add | Binary::Sub | Binary::Mul) => true,
+            Op::Unary(Unary::Power(n)) => (0..=3).contains(&n),
+            _ => false,
+        })
+    }
+
     /// Whether it is a linear function of the state and a constant, with factors that neither time nor inputs change.
     pub fn is_affine(&self) -> bool {
         // Of each number on the stack: its degree in the state, 2 for all that is neither constant nor linear.
@@ -326,7 +337,7 @@ impl Expression {
                 Op::Where => {
                     top -= 2;
                     let above = S::zero().less(stack[top - 1]);
-                    stack[top - 1] = S::select(above, stack[top], stack[top + 1]);
+                    stack[top - 1] = S::jumping(above, stack[top], stack[top + 1]);
                 }
                 Op::On(kink, side) => {
                     top -= kink.takes() - 1;
@@ -347,8 +358,8 @@ impl Unary {
             Unary::Neg => -a,
             Unary::Abs => abs(a),
             Unary::Sign => {
-                let below = S::select(a.less(S::zero()), -S::one(), S::zero());
-                S::select(S::zero().less(a), S::one(), below)
+                let below = S::jumping(a.less(S::zero()), -S::one(), S::zero());
+                S::jumping(S::zero().less(a), S::one(), below)
             }
             Unary::Sqrt => a.sqrt(),
             Unary::Exp => a.exp(),

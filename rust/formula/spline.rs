@@ -44,6 +44,10 @@ impl Spline {
             u = S::select(end.less(u), end, u);
         }
         let floor = u.real().each(f64::floor);
+        // Over several cells, or across the end of the last one.
+        if !floor.is_single() {
+            return S::constant(f64::NAN);
+        }
         // The last point belongs to the last cell. What is no number has none, and stays none.
         let floor = if self.periodic { floor } else { floor.min(S::Real::constant((cells - 1) as f64)) };
         let place = |lane: usize| match self.periodic {

@@ -1,15 +1,17 @@
 //! Landing on switching surfaces and on the wall.
 //!
 //! A step is taken with the side of every surface frozen. Then [`SurfaceMonitor::find`] looks on the step's
-//! polynomial for the first place where a surface's sign contradicts its side. A lane that crosses takes
+//! polynomial for the first place where a surface's sign contradicts its side: a few places show it of surfaces that are
+//! as slow as the state, [`sign_changes`] of all others and where these places leave it open. A lane that crosses takes
 //! its step anew up to there, and [`EventIteration`] corrects the step's size until the surface's function is
 //! zero; the other lanes go on meanwhile.
 
 use super::method::{Course, MOST_PROBES, Method, StepStart};
 use super::root::bracketed;
 use super::tolerance::Tolerance;
-use crate::model::{MAX_SURFACES, System};
-use crate::scalar::{Mask, Real, Scalar};
+use super::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes, time};
+use crate::model::{EnclosedSurfaces, MAX_SURFACES, Sides, System, choose};
+use crate::scalar::{Enclosed, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
 /// What can be crossed: the switching surfaces, then the wall.
@@ -29,11 +31,20 @@ const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 const NOISE: f64 = 1e-14;
+/// How far a function bends between places, times this, is less than the sum of two neighbours where it has no zero.
+const CLEAR: f64 = 4.0;
+/// A step with more pieces to look at is cut where they end.
+const MOST_PIECES: usize = 1 << 16;
+/// A step that starts on a surface does not cross it by less than its error times this: a body that is let go first moves
+/// by less than any error.
+const LIFT_OFF: f64 = 10.0;
+/// So many places show how far beyond a surface it gets.
+const DEPTHS: usize = 16;
 
-/// The places at which a step is looked at, and the lanes that are beyond each target at any of them.
+/// The places at which a step is looked at, and the lanes that may cross each target.
 pub struct Look<S: Scalar, const D: usize> {
     probes: [[S::Real; D]; MOST_PROBES],
-    pub beyond: [S::Mask; TARGETS],
+    pub suspect: [S::Mask; TARGETS],
 }
 
 /// The states at these parts of a step of size `h`.
@@ -43,44 +54,44 @@ pub struct Probes<'a, R: Real, const D: usize> {
     states: &'a [[R; D]; MOST_PROBES],
 }
 
-/// Finds the lanes that are beyond each target at any of these places. A function of its own for each law and kind of
-/// number, whatever the method.
+/// Finds the lanes that may cross each target: those beyond it at any of these places, and those that the places leave in
+/// doubt. A function of its own for each law and kind of number, whatever the method.
 #[inline(never)]
-pub fn beyond<M: System<S, D>, S: Scalar, const D: usize>(
+pub fn suspect<M: System<S, D>, S: Scalar, const D: usize>(
     system: &M,
     at: &StepStart<S, D>,
     wall: bool,
     probes: &Probes<'_, S::Real, D>,
-    beyond: &mut [S::Mask; TARGETS],
+    suspect: &mut [S::Mask; TARGETS],
 ) {
     // Where there is no target this is not asked.
     if const { M::SMOOTH } {
         return;
     }
-    let watch = SurfaceMonitor { system, at, wall, noise: NOISE };
+    let watch = SurfaceMonitor { system, at, wall, noise: NOISE, rtol: 0.0 };
     // The numbers of places, quarters or eighths, known to the compiler, which looks at them side by side.
     match probes.parts.len() {
-        4 if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(4, probes, beyond),
-        _ if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(MOST_PROBES, probes, beyond),
-        places => watch.at_places(places, probes, beyond),
+        4 if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(4, probes, suspect),
+        _ if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(MOST_PROBES, probes, suspect),
+        places => watch.at_places(places, probes, suspect),
     }
 }
 
 /// The same, one target and one place after the other: for laws whose surfaces are long to ask for.
-pub fn beyond_in_turn<M: System<S, D>, S: Scalar, const D: usize>(
+pub fn suspect_in_turn<M: System<S, D>, S: Scalar, const D: usize>(
     system: &M,
     at: &StepStart<S, D>,
     wall: bool,
     probes: &Probes<'_, S::Real, D>,
-    beyond: &mut [S::Mask; TARGETS],
+    suspect: &mut [S::Mask; TARGETS],
 ) {
     if const { M::SMOOTH } {
         return;
     }
-    let watch = SurfaceMonitor { system, at, wall, noise: NOISE };
-    for (target, beyond) in beyond.iter_mut().enumerate() {
+    let watch = SurfaceMonitor { system, at, wall, noise: NOISE, rtol: 0.0 };
+    for (target, suspect) in suspect.iter_mut().enumerate() {
         if watch.has(target) {
-            *beyond = watch.at_target(target, probes.parts.len(), probes);
+            *suspect = watch.at_target(target, probes.parts.len(), probes);
         }
     }
 }
@@ -98,6 +109,8 @@ pub struct Found<R: Real> {
     pub high: R,
     /// Where the target's function counts as zero.
     pub zero: R,
+    /// As far after the start of the step as there is surely no crossing, in lanes where that is not its end.
+    pub cut: R,
 }
 
 /// A run on the way from one step to the next: what is looked at, and from where.
@@ -107,6 +120,8 @@ pub struct SurfaceMonitor<'a, M, S: Scalar, const D: usize> {
     wall: bool,
     /// A surface whose function stays below this in a step is left alone: the step's error is larger.
     noise: f64,
+    /// What a step's error may be, as a part of the function.
+    rtol: f64,
 }
 
 impl<'a, M, S, const D: usize> SurfaceMonitor<'a, M, S, D>
@@ -117,7 +132,7 @@ where
     /// From here on, with or without a wall.
     #[inline(always)]
     pub fn new(system: &'a M, at: &'a StepStart<S, D>, wall: bool, tolerance: &Tolerance) -> Self {
-        Self { system, at, wall, noise: NOISE.max(tolerance.atol) }
+        Self { system, at, wall, noise: NOISE.max(tolerance.atol), rtol: tolerance.rtol }
     }
 
     /// Whether there is such a target.
@@ -147,36 +162,66 @@ where
     #[inline(always)]
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.system.watched());
-        let mut beyond = [S::mask(false); TARGETS];
-        self.system.beyond(self.at, self.wall, &Probes { h, parts: K::PROBES, states: &probes }, &mut beyond);
-        for beyond in &mut beyond {
-            *beyond = beyond.and(lanes);
+        let mut suspect = [S::mask(false); TARGETS];
+        self.system.suspect(
+            self.at,
+            self.wall,
+            &Probes { h, parts: K::PROBES, states: &probes },
+            &mut suspect,
+        );
+        for suspect in &mut suspect {
+            *suspect = suspect.and(lanes);
         }
-        Look { probes, beyond }
+        Look { probes, suspect }
     }
 
-    /// The lanes that are beyond each target at any of so many places.
+    /// Whether the target's function is as slow as the state.
     #[inline(always)]
-    fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, beyond: &mut [S::Mask; TARGETS]) {
+    fn is_steady(&self, target: usize) -> bool {
+        target == WALL || self.system.is_steady(target, &self.at.sides)
+    }
+
+    /// The lanes that may cross each target, by so many places.
+    #[inline(always)]
+    fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, suspect: &mut [S::Mask; TARGETS]) {
         // Unrolled, so that each target's function is known.
         unroll!(target in 0..TARGETS => {
             if self.has(target) {
-                beyond[target] = self.at_target(target, places, probes);
+                suspect[target] = self.at_target(target, places, probes);
             }
         });
     }
 
-    /// The lanes that are beyond a target at any of so many places.
+    /// The lanes that may cross a target, by so many places.
     #[inline(always)]
     fn at_target(&self, target: usize, places: usize, probes: &Probes<'_, S::Real, D>) -> S::Mask {
+        if !self.is_steady(target) {
+            return S::mask(true);
+        }
         let parts = &probes.parts[..places];
-        let mut any = S::mask(false);
+        let zero = S::Real::zero();
+        let mut beyond = S::mask(false);
+        // The sum of neighbours, and by how much a value differs from their mean.
+        let (mut least, mut bend) = (S::Real::constant(f64::INFINITY), zero);
+        let (mut last, mut before) = (zero, zero);
         for i in 0..places {
             let x = vector!(S, D; n => S::lift(probes.states[i][n]));
             let value = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
-            any = any.or(value.less(S::Real::zero()));
+            beyond = beyond.or(value.less(zero));
+            if i == 1 {
+                // The value at the start, on the straight line through the next two.
+                least = last.scale(3.0) - value;
+            }
+            if i > 0 {
+                least = least.min(last + value);
+            }
+            // Every other one will do where there are many.
+            if i > 1 && (places < MOST_PROBES || i % 2 == 0) {
+                bend = bend.max((value - last.scale(2.0) + before).abs());
+            }
+            (before, last) = (last, value);
         }
-        any
+        beyond.or(bend.scale(CLEAR).less(least).not())
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.
@@ -190,12 +235,18 @@ where
         let never = S::mask(false);
         let infinite = S::Real::constant(f64::INFINITY);
         let zero = S::Real::zero();
-        let mut found =
-            Found { crossing: [never; TARGETS], stale: [never; TARGETS], dt: infinite, high: infinite, zero };
+        let mut found = Found {
+            crossing: [never; TARGETS],
+            stale: [never; TARGETS],
+            dt: infinite,
+            high: infinite,
+            zero,
+            cut: infinite,
+        };
         let mut earliest = infinite;
         let mut stale = never;
         for target in 0..TARGETS {
-            if !self.has(target) || !look.beyond[target].any() {
+            if !self.has(target) || !look.suspect[target].any() {
                 continue;
             }
             let on = |dt: S::Real| self.on(target, method, dt);
@@ -203,11 +254,13 @@ where
             let mut scale = start.abs();
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
+            let mut values = [start; MOST_PROBES + 1];
             for (i, &theta) in method.probes().iter().enumerate() {
                 let dt = h.scale(theta);
                 let x = vector!(S, D; n => S::lift(look.probes[i][n]));
                 let value = self.value(target, self.at.t + dt, &x);
                 scale = scale.max(value.abs());
+                values[i + 1] = value;
                 let new = value.less(zero).and(wrong.not());
                 high = pick(new, (dt, value), high);
                 wrong = wrong.or(new);
@@ -216,10 +269,40 @@ where
                     early = new;
                 }
             }
-            let mut crossing = lanes.and(wrong);
+            let mut open = lanes.and(look.suspect[target]);
             if target != WALL {
-                crossing = crossing.and(scale.less(S::Real::constant(self.noise)).not());
+                open = open.and(scale.less(S::Real::constant(self.noise)).not());
             }
+            let values = &values[..=method.probes().len()];
+            for lane in open.lanes() {
+                let shown = |value: &S::Real| value.lane(lane);
+                if self.is_steady(target) && resolved(&values.iter().map(shown).collect::<Vec<_>>()) {
+                    continue;
+                }
+                let only = S::Mask::from_lanes(|i| i == lane);
+                match self.first_crossing(
+                    target,
+                    method,
+                    (h, lane),
+                    (shown(&start), shown(&values[values.len() - 1]), shown(&scale)),
+                ) {
+                    Located::Between(from, to) => {
+                        let lift =
+                            |(dt, value): (f64, f64)| (S::Real::constant(dt), S::Real::constant(value));
+                        low = pick(only, lift(from), low);
+                        high = pick(only, lift(to), high);
+                        wrong = wrong.or(only);
+                        early = choose(only, S::mask(from.0 == 0.0), early);
+                    }
+                    Located::Nowhere => {}
+                    Located::Before(dt) => {
+                        let nearer = S::Real::constant(dt);
+                        let nearer = S::Real::select(nearer.abs().less(found.cut.abs()), nearer, found.cut);
+                        found.cut = S::Real::select(only, nearer, found.cut);
+                    }
+                }
+            }
+            let mut crossing = open.and(wrong);
             if !crossing.any() {
                 continue;
             }
@@ -243,10 +326,111 @@ where
                 found.crossing[j] = if j == target { first } else { found.crossing[j].and(first.not()) };
             }
         }
+        let late = found.cut.abs().less(found.dt.abs());
         for crossing in &mut found.crossing {
-            *crossing = crossing.and(stale.not());
+            *crossing = crossing.and(stale.not()).and(late.not());
         }
         found
+    }
+
+    /// Looks for the first crossing of a target in a lane, from these values at the start and at the end of the step.
+    #[inline(never)]
+    fn first_crossing(
+        &self,
+        target: usize,
+        method: &dyn Course<S, D>,
+        (h, lane): (S::Real, usize),
+        (first, last, scale): (f64, f64, f64),
+    ) -> Located {
+        let Some(laws) = self.system.enclosing(lane) else { return Located::Nowhere };
+        let mut coefficients = Vec::new();
+        let unit = method.polynomial(&mut coefficients).lane(lane);
+        let size = h.lane(lane);
+        let coefficient = |n: usize, k: usize| coefficients[k][n].real().lane(lane);
+        let mut curve = TargetCurve {
+            monitor: self,
+            method,
+            target,
+            lane,
+            step: (self.at.t.lane(lane), size),
+            polynomials: Polynomials::new(coefficients.len(), size / unit, coefficient),
+            laws,
+            sides: self.at.sides.map(|side| Enclosed::mask(side.lane(lane))),
+        };
+        let start = Some((0.0, first, false));
+        // How deep it gets beyond the surface between these parts of the step.
+        let depth = |from: f64, to: f64| {
+            let places = (1..DEPTHS).map(|i| from + (to - from) * i as f64 / DEPTHS as f64);
+            let value = |s: f64| self.on(target, method, S::Real::constant(s * size)).lane(lane);
+            places.map(|s| -value(s)).fold(0.0, f64::max)
+        };
+        let error = LIFT_OFF * (self.noise + self.rtol * scale);
+        let on_start = first.abs() <= error;
+        let (mut located, mut doubtful) = (Located::Nowhere, None);
+        let between = |own: Bracket| {
+            let place = |(s, value): (f64, f64)| (s * size, value);
+            Located::Between(place(own.low), place(own.high))
+        };
+        let patient = |pieces: usize| pieces <= MOST_PIECES;
+        let far = sign_changes(&mut curve, start, (first, last), &patient, &mut |bracket| {
+            match doubtful.take() {
+                // Back from where the start led.
+                Some(before) if depth(0.0, bracket.high.0) > error => located = between(before),
+                Some(_) => return Search::Next,
+                None if on_start && bracket.low.0 == 0.0 => {
+                    doubtful = Some(bracket);
+                    return Search::Next;
+                }
+                None => located = between(bracket),
+            }
+            Search::Enough
+        });
+        if let Some(bracket) = doubtful {
+            located = between(bracket);
+        }
+        match located {
+            Located::Nowhere if 0.0 < far && far < 1.0 => Located::Before(far * size),
+            located => located,
+        }
+    }
+}
+
+/// Where a lane first crosses a target.
+enum Located {
+    Nowhere,
+    /// Times after the start of the step, and the values there.
+    Between((f64, f64), (f64, f64)),
+    /// Not before this time; how it goes on is not known.
+    Before(f64),
+}
+
+/// A target's function along a lane's step, positive on the side that the law is frozen on.
+struct TargetCurve<'a, M, S: Scalar, const D: usize> {
+    monitor: &'a SurfaceMonitor<'a, M, S, D>,
+    method: &'a dyn Course<S, D>,
+    target: usize,
+    lane: usize,
+    /// When it begins and how long it is.
+    step: (f64, f64),
+    polynomials: Polynomials<D>,
+    laws: Box<dyn EnclosedSurfaces<D> + 'a>,
+    sides: Sides<Enclosed>,
+}
+
+impl<M: System<S, D>, S: Scalar, const D: usize> Curve for TargetCurve<'_, M, S, D> {
+    fn value(&mut self, s: f64) -> f64 {
+        let dt = S::Real::constant(s * self.step.1);
+        self.monitor.on(self.target, self.method, dt).lane(self.lane)
+    }
+
+    fn enclose(&mut self, a: f64, b: f64) -> Enclosed {
+        let x = vector!(Enclosed, D; n => self.polynomials.enclose(n, a, b));
+        if self.target == WALL {
+            return self.laws.enclosed_wall(&x).unwrap_or(Enclosed::one());
+        }
+        let value =
+            self.laws.enclosed_surface(self.target, time(self.step.0, self.step.1, a, b), &x, &self.sides);
+        Enclosed::select(self.sides[self.target], value, -value)
     }
 }
 

@@ -313,6 +313,11 @@ where
         let targets = !M::SMOOTH && (run.wall || self.system.surfaces() > 0);
         let landing = if targets { run.landing.lanes() } else { S::mask(false) };
 
+        let longest = self.norm.state().max_step;
+        if longest.is_finite() {
+            // The last step may be longer than the others by as much as is left for it below.
+            run.h = run.h.abs().min(S::Real::constant(longest / 1.01)).zip(run.h, f64::copysign);
+        }
         let cut = run.h.abs().scale(1.01).less(remaining.abs()).not();
         let mut h = S::Real::select(cut, remaining, run.h);
         let mut last = cut;
@@ -365,7 +370,7 @@ where
             let lanes = progress.moved.and(run.undecided.not());
             let watch = SurfaceMonitor::new(&self.system, &run.at, run.wall, self.norm.state());
             let look = watch.look(&self.method, trial.size, lanes);
-            if union(&look.beyond).or(landing).or(run.undecided).any() {
+            if union(&look.suspect).or(landing).or(run.undecided).any() {
                 let accepted = progress.moved;
                 let (method, norm): (&mut dyn Course<S, D>, _) = (&mut self.method, self.norm.state());
                 let (looked, ends) = ((accepted, &look, landing), (end, last));
@@ -483,8 +488,22 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         let found = watch.find(method, trial.size, accepted.and(leaving.not()), look);
         let crossing = union(&found.crossing);
         let stale = union(&found.stale);
-        let clear = accepted.and(crossing.or(stale).not());
+        let mut clear = accepted.and(crossing.or(stale).not());
         let mut trial = *trial;
+        let mut last = last;
+        let cut = clear.and(found.cut.finite());
+        if cut.any() {
+            // What comes behind is not known yet.
+            if method.series() {
+                let x = method.at(found.cut);
+                trial.x = vector!(S, D; n => S::select(cut, x[n], trial.x[n]));
+                trial.size = S::Real::select(cut, found.cut, trial.size);
+                last = last.and(cut.not());
+            } else {
+                clear = clear.and(cut.not());
+                self.h = S::Real::select(cut, found.cut, self.h);
+            }
+        }
         let mut crossed = [never; TARGETS];
         let mut landed = EventStatus { there: never, grazed: never };
 

@@ -108,6 +108,7 @@ pub(super) trait Course<S: Scalar, const D: usize> {
     fn real_at(&self, dt: S::Real, of: &[bool; D]) -> [S::Real; D];
     fn probes(&self) -> &'static [f64];
     fn series(&self) -> bool;
+    fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;
 }
 
 impl<S: Scalar, const D: usize, K: Method<S, D>> Course<S, D> for K {
@@ -128,5 +129,8 @@ impl<S: Scalar, const D: usize, K: Method<S, D>> Course<S, D> for K {
     }
     fn series(&self) -> bool {
         K::SERIES
+    }
+    fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real {
+        Method::polynomial(self, coefficients)
     }
 }

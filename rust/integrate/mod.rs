@@ -18,9 +18,10 @@ mod steps;
 pub mod tableau;
 mod taylor;
 mod tolerance;
+pub mod zeros;
 
 pub use dop853::Dop853Scheme;
-pub use event_location::{Probes, TARGETS, WALL, beyond, beyond_in_turn};
+pub use event_location::{Probes, TARGETS, WALL, suspect, suspect_in_turn};
 pub use integrator::{Counts, Ending, Integrator, Progress};
 pub use method::{MOST_PROBES, Method, StepStart, Trial};
 pub use propagate::propagate;

@@ -33,20 +33,27 @@ pub struct Tolerance {
     pub rtol: f64,
     /// Absolute tolerance, in the state's own units.
     pub atol: f64,
+    /// The longest step, whatever the error: of a pulse that is shorter than a step nothing may be seen.
+    pub max_step: f64,
 }
 
 impl Default for Tolerance {
     fn default() -> Self {
-        Self { rtol: 1e-9, atol: 1e-12 }
+        Self::new(1e-9, 1e-12)
     }
 }
 
 impl Tolerance {
+    /// With steps as long as the error allows.
+    pub const fn new(rtol: f64, atol: f64) -> Self {
+        Self { rtol, atol, max_step: f64::INFINITY }
+    }
+
     /// The tolerance whose norm over `D` components, of which `idle` rest and have no error, is this one's over the
     /// others.
     pub fn filled<const D: usize>(&self, idle: usize) -> Self {
         let factor = ((D - idle) as f64 / D as f64).sqrt();
-        Self { rtol: self.rtol * factor, atol: self.atol * factor }
+        Self { rtol: self.rtol * factor, atol: self.atol * factor, ..*self }
     }
 
     /// The norm of `error`: 1 where it is just allowed.

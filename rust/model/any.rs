@@ -1,6 +1,6 @@
 //! A system whose type is forgotten.
 
-use super::{Piece, Sides, System};
+use super::{EnclosedSurfaces, Piece, Sides, System};
 use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
@@ -11,6 +11,8 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];
     fn surfaces(&self) -> usize;
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S;
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool;
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>>;
     fn watched(&self) -> [bool; D];
     fn surface_name(&self, j: usize, side: bool) -> &'static str;
     fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>);
@@ -21,7 +23,7 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64>;
     fn clock_side(&self, t: S::Real, forwards: bool) -> bool;
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S>;
-    fn beyond(
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
@@ -39,6 +41,12 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     }
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
         System::surface(self, j, t, x, sides)
+    }
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        System::is_steady(self, j, sides)
+    }
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
+        System::enclosing(self, lane)
     }
     fn watched(&self) -> [bool; D] {
         System::watched(self)
@@ -70,14 +78,14 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
         System::input(self, k, t, sides)
     }
-    fn beyond(
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
     ) {
-        System::beyond(self, at, wall, probes, found);
+        System::suspect(self, at, wall, probes, found);
     }
 }
 
@@ -90,6 +98,12 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     }
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
         AnySystem::surface(&**self, j, t, x, sides)
+    }
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        AnySystem::is_steady(&**self, j, sides)
+    }
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
+        AnySystem::enclosing(&**self, lane)
     }
     fn watched(&self) -> [bool; D] {
         AnySystem::watched(&**self)
@@ -121,13 +135,13 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
         AnySystem::input(&**self, k, t, sides)
     }
-    fn beyond(
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
     ) {
-        AnySystem::beyond(&**self, at, wall, probes, found);
+        AnySystem::suspect(&**self, at, wall, probes, found);
     }
 }

@@ -2,8 +2,8 @@
 
 use super::effects::{Contact, Contributions, Dry, Effect, EffectInputs, Term};
 use super::stick_slip::{REVERSAL, Slider, Sticking};
-use super::{Family, Momentum, Parameter, Sides, System, choose, parameter};
-use crate::scalar::{Dual, Mask, Scalar};
+use super::{EnclosedSurfaces, Family, Momentum, Parameter, Sides, System, choose, enclosed, parameter};
+use crate::scalar::{Dual, Enclosed, Mask, Scalar};
 
 /// The disk, per unit mass, for the state `[Omega, Y, Z, beta]`:
 ///
@@ -100,6 +100,21 @@ impl<S: Scalar> Disk<S> {
             g: lift(self.g),
             radius,
             contact,
+        }
+    }
+
+    /// The same law over intervals.
+    pub(super) fn enclosed(&self, lane: usize) -> Disk<Enclosed> {
+        let of = |number| enclosed(number, lane);
+        let Friction { k0, k1, k2 } = self.friction;
+        Disk {
+            w: of(self.w),
+            radius: of(self.radius),
+            g: of(self.g),
+            friction: Friction { k0: of(k0), k1: of(k1), k2: of(k2) },
+            effects: self.effects.iter().map(|own| own.map(of)).collect(),
+            edge: self.edge,
+            sticking: self.sticking,
         }
     }
 
@@ -212,6 +227,15 @@ impl<S: Scalar> System<S, 4> for Disk<S> {
             KINK => self.friction.kink(speed_of(x[0], sides)),
             _ => self.sliding_surface(j, t, x, sides),
         }
+    }
+
+    #[inline(always)]
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        j <= KINK || self.is_slow(j, sides)
+    }
+
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<4> + '_>> {
+        Some(Box::new(self.enclosed(lane)))
     }
 
     #[inline(always)]

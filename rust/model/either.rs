@@ -1,6 +1,6 @@
 //! One of two models of the same dimension.
 
-use super::{Family, Parameter, Piece, Sides, System};
+use super::{EnclosedSurfaces, Family, Parameter, Piece, Sides, System};
 use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
@@ -44,6 +44,13 @@ where
         ask!(self, model => model.surface(j, t, x, sides))
     }
     #[inline(always)]
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        ask!(self, model => model.is_steady(j, sides))
+    }
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
+        ask!(self, model => model.enclosing(lane))
+    }
+    #[inline(always)]
     fn watched(&self) -> [bool; D] {
         ask!(self, model => model.watched())
     }
@@ -80,14 +87,14 @@ where
         ask!(self, model => model.input(k, t, sides))
     }
     #[inline(always)]
-    fn beyond(
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
     ) {
-        ask!(self, model => model.beyond(at, wall, probes, found));
+        ask!(self, model => model.suspect(at, wall, probes, found));
     }
 }
 

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use super::sliding_mode::{self, SlidingSurface};
 use super::{
-    Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System, choose, parameter,
+    EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System,
+    choose, enclosed, parameter,
 };
 use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
-use crate::integrate::{Probes, StepStart, TARGETS, beyond_in_turn};
-use crate::scalar::{Mask, Real, Scalar};
+use crate::integrate::{Probes, StepStart, TARGETS, suspect_in_turn};
+use crate::scalar::{Enclosed, Mask, Real, Scalar};
 use crate::unroll::vector;
 
 /// The most intermediate values of an equation; most need few.
@@ -90,6 +91,30 @@ impl<S: Scalar, const D: usize> Own<S, D> {
         }
     }
 
+    /// The same law over intervals.
+    fn enclosed(&self, lane: usize) -> Own<Enclosed, D> {
+        let of = |&number: &S| enclosed(number, lane);
+        let all = |numbers: &[S]| numbers.iter().map(of).collect();
+        let sliding = |own: &SlidingSurface<S>| SlidingSurface {
+            surface: own.surface,
+            mode: own.mode,
+            offset: of(&own.offset),
+            gradient: all(&own.gradient),
+        };
+        Own {
+            equations: self.equations.clone(),
+            kinks: self.kinks.clone(),
+            sliding: self.sliding.iter().map(sliding).collect(),
+            deep: self.deep,
+            parameters: all(&self.parameters),
+            inputs: match &self.inputs {
+                InputValues::None => InputValues::None,
+                InputValues::Measured(inputs) => InputValues::Measured(inputs.map(of)),
+                InputValues::Constant(values) => InputValues::Constant(all(values)),
+            },
+        }
+    }
+
     /// The number of the clock's surface, where there is one.
     fn knots(&self) -> usize {
         self.kinks.surfaces.len() + self.sliding.len()
@@ -164,6 +189,21 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         value
     }
 
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        match self.kinks.steady.get(j) {
+            Some(&steady) => steady,
+            None => !self.sliding_on(j).is_some_and(|i| self.sliding[i].slides(sides).any()),
+        }
+    }
+
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
+        // Packets have no kinks.
+        if const { S::Real::LANES > 1 } {
+            return None;
+        }
+        Some(Box::new(self.enclosed(lane)))
+    }
+
     fn surface_name(&self, j: usize, side: bool) -> &'static str {
         match (self.kinks.jumps.get(j), side) {
             (Some(true), _) => "jump",
@@ -216,14 +256,14 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         inputs.side(t.lane(0), forwards)
     }
 
-    fn beyond(
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
     ) {
-        beyond_in_turn(self, at, wall, probes, found);
+        suspect_in_turn(self, at, wall, probes, found);
     }
 
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {

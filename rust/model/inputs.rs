@@ -151,6 +151,16 @@ impl Signals {
 }
 
 impl<S: Scalar> Inputs<S> {
+    /// The same with other numbers for the delays.
+    pub fn map<T: Scalar>(&self, number: impl Fn(&S) -> T) -> Inputs<T> {
+        Inputs {
+            signals: self.signals.clone(),
+            timeline: self.timeline.clone(),
+            delays: self.delays.iter().map(number).collect(),
+            jumps: self.jumps,
+        }
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         self.signals.len()

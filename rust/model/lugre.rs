@@ -1,7 +1,9 @@
 //! A contact of bristles that bend before they slide: the LuGre friction model.
 
 use super::effects::Contact;
-use super::{Disk, DiskFamily, Family, Parameter, Pendulum, PendulumFamily, Sides, System, parameter};
+use super::{
+    Disk, DiskFamily, EnclosedSurfaces, Family, Parameter, Pendulum, PendulumFamily, Sides, System, parameter,
+};
 use crate::scalar::Scalar;
 
 /// A model whose dry friction comes from bristles, with their deflection in rad as one more state, the last.
@@ -40,6 +42,10 @@ impl<S: Scalar> System<S, 5> for WithLuGre<Disk<S>> {
         self.0.surface(j, t, &[omega, y, z, beta], sides)
     }
 
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<5> + '_>> {
+        Some(Box::new(WithLuGre(self.0.enclosed(lane))))
+    }
+
     fn surface_name(&self, j: usize, side: bool) -> &'static str {
         self.0.surface_name(j, side)
     }
@@ -65,6 +71,10 @@ impl<S: Scalar> System<S, 3> for WithLuGre<Pendulum<S>> {
     #[inline(always)]
     fn surface(&self, j: usize, t: S, &[omega, theta, _]: &[S; 3], sides: &Sides<S>) -> S {
         self.0.surface(j, t, &[omega, theta], sides)
+    }
+
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<3> + '_>> {
+        Some(Box::new(WithLuGre(self.0.enclosed(lane))))
     }
 
     fn surface_name(&self, j: usize, side: bool) -> &'static str {

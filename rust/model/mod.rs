@@ -30,8 +30,8 @@ pub use observation::Observation;
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick_slip::Sticking;
 
-use crate::integrate::{Probes, StepStart, TARGETS, beyond};
-use crate::scalar::{Mask, Scalar};
+use crate::integrate::{Probes, StepStart, TARGETS, suspect};
+use crate::scalar::{Enclosed, Mask, Real, Scalar};
 
 /// The most switching surfaces a model can have.
 pub const MAX_SURFACES: usize = 6;
@@ -56,6 +56,17 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     /// The function whose zero is surface `j`. It may use the sides of the surfaces before `j`.
     fn surface(&self, _j: usize, _t: S, _x: &[S; D], _sides: &Sides<S>) -> S {
         S::one()
+    }
+
+    /// Whether the function of surface `j` changes no faster than the state does, as linear functions of it: then a few
+    /// places within a step show how it bends. Of others the [enclosing](System::enclosing) laws say where they have zeros.
+    fn is_steady(&self, _j: usize, _sides: &Sides<S>) -> bool {
+        true
+    }
+
+    /// The surfaces of this lane over intervals, where the law has them.
+    fn enclosing(&self, _lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
+        None
     }
 
     /// The components of the state that the surfaces and the wall depend on: only these are looked at within
@@ -110,8 +121,8 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         Piece { origin: S::zero(), coefficients: [0.0; PIECE_COEFFICIENTS] }
     }
 
-    /// Looks on which side of every surface, and of the wall, a step's places are; see [`beyond`].
-    fn beyond(
+    /// Looks on which side of every surface, and of the wall, a step's places are; see [`suspect`].
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
@@ -120,7 +131,7 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     ) where
         Self: Sized,
     {
-        beyond(self, at, wall, probes, found);
+        suspect(self, at, wall, probes, found);
     }
 }
 
@@ -138,6 +149,13 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     #[inline(always)]
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
         (**self).surface(j, t, x, sides)
+    }
+    #[inline(always)]
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        (**self).is_steady(j, sides)
+    }
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
+        (**self).enclosing(lane)
     }
     #[inline(always)]
     fn watched(&self) -> [bool; D] {
@@ -176,15 +194,44 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
         (**self).input(k, t, sides)
     }
     #[inline(always)]
-    fn beyond(
+    fn suspect(
         &self,
         at: &StepStart<S, D>,
         wall: bool,
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
     ) {
-        (**self).beyond(at, wall, probes, found);
+        (**self).suspect(at, wall, probes, found);
     }
+}
+
+/// The surfaces of a law over a stretch of time and state.
+pub trait EnclosedSurfaces<const D: usize> {
+    /// All values and slopes of the function of surface `j`.
+    fn enclosed_surface(&self, j: usize, t: Enclosed, x: &[Enclosed; D], sides: &Sides<Enclosed>)
+    -> Enclosed;
+    /// Those of the wall.
+    fn enclosed_wall(&self, x: &[Enclosed; D]) -> Option<Enclosed>;
+}
+
+impl<M: System<Enclosed, D>, const D: usize> EnclosedSurfaces<D> for M {
+    fn enclosed_surface(
+        &self,
+        j: usize,
+        t: Enclosed,
+        x: &[Enclosed; D],
+        sides: &Sides<Enclosed>,
+    ) -> Enclosed {
+        System::surface(self, j, t, x, sides)
+    }
+    fn enclosed_wall(&self, x: &[Enclosed; D]) -> Option<Enclosed> {
+        System::wall(self, x)
+    }
+}
+
+/// A number of a law as one without a spread.
+fn enclosed<S: Scalar>(number: S, lane: usize) -> Enclosed {
+    Enclosed::constant(number.real().lane(lane))
 }
 
 /// The sides on which a state lies, by the sign of each surface's function.

@@ -2,8 +2,8 @@
 
 use super::effects::{Contact, Contributions, Dry, Effect, EffectInputs, Term};
 use super::stick_slip::{REVERSAL, Slider, Sticking};
-use super::{Family, Parameter, Sides, System, choose, parameter};
-use crate::scalar::{Mask, Scalar};
+use super::{EnclosedSurfaces, Family, Parameter, Sides, System, choose, enclosed, parameter};
+use crate::scalar::{Enclosed, Mask, Scalar};
 
 /// A pendulum, per unit mass, for the state `[Omega, theta]` with `theta = 0` hanging:
 ///
@@ -30,6 +30,19 @@ pub struct Pendulum<S> {
 }
 
 impl<S: Scalar> Pendulum<S> {
+    /// The same law over intervals.
+    pub(super) fn enclosed(&self, lane: usize) -> Pendulum<Enclosed> {
+        let of = |number| enclosed(number, lane);
+        Pendulum {
+            length: of(self.length),
+            inertia: of(self.inertia),
+            g: of(self.g),
+            k0: of(self.k0),
+            effects: self.effects.iter().map(|own| own.map(of)).collect(),
+            sticking: self.sticking,
+        }
+    }
+
     /// The torque, all told, and what dry friction does beside it.
     #[inline]
     pub(super) fn torque(
@@ -96,6 +109,15 @@ impl<S: Scalar> System<S, 2> for Pendulum<S> {
     #[inline(always)]
     fn surface(&self, j: usize, t: S, x: &[S; 2], sides: &Sides<S>) -> S {
         if j == REVERSAL { x[0] } else { self.sliding_surface(j, t, x, sides) }
+    }
+
+    #[inline(always)]
+    fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
+        j == REVERSAL || self.is_slow(j, sides)
+    }
+
+    fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<2> + '_>> {
+        Some(Box::new(self.enclosed(lane)))
     }
 
     fn surface_name(&self, j: usize, side: bool) -> &'static str {

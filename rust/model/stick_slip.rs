@@ -89,6 +89,14 @@ pub trait Slider<S: Scalar, const D: usize> {
         S::select(open, margin(torque, dry.hold), -S::one())
     }
 
+    /// Whether the function of [`Slider::BAND`] or [`Slider::STUCK`] changes no faster than the state: a constant does,
+    /// the torque on a contact at rest need not.
+    #[inline(always)]
+    fn is_slow(&self, j: usize, sides: &Sides<S>) -> bool {
+        let banded = self.sticking() == Sticking::InBand;
+        if j == Self::BAND { !banded } else { !banded && !sides[Self::STUCK].any() }
+    }
+
     /// A contact at rest that friction does not hold slides where the torque pulls it.
     fn settle_contact(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
         if self.sticking() == Sticking::Never {

@@ -24,7 +24,7 @@ use crate::integrate::Tolerance;
 use crate::model::{Either, Family, FormulaFamily};
 
 /// A frame's flow is followed much more closely than the model's smallest assumed error.
-const TOLERANCE: Tolerance = Tolerance { rtol: 1e-7, atol: 1e-9 };
+const TOLERANCE: Tolerance = Tolerance::new(1e-7, 1e-9);
 
 /// An array: its numbers in C order.
 pub struct Array {

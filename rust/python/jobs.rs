@@ -50,6 +50,7 @@ pub struct Batch<'py> {
     pub starts: PyReadonlyArray2<'py, f64>,
     rtol: f64,
     atol: f64,
+    max_step: f64,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
 }
@@ -60,7 +61,7 @@ impl<'py> Batch<'py> {
     }
 
     pub fn tolerance(&self) -> Tolerance {
-        Tolerance { rtol: self.rtol, atol: self.atol }
+        Tolerance { rtol: self.rtol, atol: self.atol, max_step: self.max_step }
     }
 
     pub fn rows(&self, model: &AnyModel) -> PyResult<Vec<Vec<f64>>> {

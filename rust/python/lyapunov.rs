@@ -155,9 +155,10 @@ fn frames<'py>(
     count: usize,
     rtol: f64,
     atol: f64,
+    max_step: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?.undriven()?.filled();
-    let tolerance = Tolerance { rtol, atol };
+    let tolerance = Tolerance { rtol, atol, max_step };
     let (states, growth, covariant, dimension) = with_wide_model!(packets: &model, |family, values| {
         let x0 = state(&state0, family.idle())?;
         // States and growth, three matrices on the way and what is made of them.

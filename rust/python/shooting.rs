@@ -32,7 +32,7 @@ fn shoot<'py>(
     atol: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?.undriven()?.filled();
-    let tolerance = Tolerance { rtol, atol };
+    let tolerance = Tolerance::new(rtol, atol);
     let rows = jobs::values(&model, &values)?;
     let (t, spans) = (t.as_slice()?, spans.as_slice()?);
     if wanted.len() > MOST_PARAMETERS || wanted.iter().any(|&p| p >= model.values().len()) {

@@ -189,7 +189,7 @@ impl Dense {
 /// Runs a model from a state, at the given times or, where none are given, from 0 to `end` with every
 /// accepted step. Returns a dict.
 #[pyfunction]
-#[pyo3(signature = (model, times, end, state0, rtol, atol, method, dense))]
+#[pyo3(signature = (model, times, end, state0, rtol, atol, max_step, method, dense))]
 fn simulate<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,
@@ -198,11 +198,12 @@ fn simulate<'py>(
     state0: Vec<f64>,
     rtol: f64,
     atol: f64,
+    max_step: f64,
     method: &str,
     dense: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let model = AnyModel::from_python(model)?;
-    let tolerance = Tolerance { rtol, atol };
+    let tolerance = Tolerance { rtol, atol, max_step };
     let by = if method == "rodas" { RunMethod::Rodas } else { RunMethod::Explicit(stepper(method)?) };
     // The models that are built in are not stiff; where they come to rest steps are held down, too.
     let watched = model.is_own();

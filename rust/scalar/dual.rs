@@ -226,6 +226,15 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         if const { deep::<S>() } { apart(selected, (mask, &yes, &no)) } else { selected((mask, &yes, &no)) }
     }
     #[inline(always)]
+    fn jumping(mask: S::Mask, yes: Self, no: Self) -> Self {
+        let d = vector!(S, N; i => S::slope_of_jump(mask, yes.d[i], no.d[i]));
+        Self { re: S::jumping(mask, yes.re, no.re), d }
+    }
+    #[inline(always)]
+    fn is_single(self) -> bool {
+        self.re.is_single()
+    }
+    #[inline(always)]
     fn mask(value: bool) -> S::Mask {
         S::mask(value)
     }

@@ -8,6 +8,7 @@
 mod dual;
 pub mod elementary;
 mod fan;
+mod interval;
 mod isa;
 mod lanes;
 mod packet;
@@ -15,6 +16,7 @@ mod real;
 
 pub use dual::Dual;
 pub use fan::DerivativeLanes;
+pub use interval::{Enclosed, Interval, Truth};
 pub(crate) use isa::run_with;
 pub use isa::{InstructionSet, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
@@ -107,6 +109,21 @@ pub trait Scalar:
     fn less(self, other: Self) -> Self::Mask;
     /// `yes` where the mask is true, `no` elsewhere, with their derivatives.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// The same where the number jumps from the one to the other.
+    #[inline(always)]
+    fn jumping(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self::select(mask, yes, no)
+    }
+    /// The derivative of what jumps.
+    #[inline(always)]
+    fn slope_of_jump(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self::select(mask, yes, no)
+    }
+    /// Whether it stands for one number only, or one in each lane.
+    #[inline(always)]
+    fn is_single(self) -> bool {
+        true
+    }
     /// The same truth value in every lane.
     fn mask(value: bool) -> Self::Mask;
 

@@ -8,7 +8,7 @@ use udd::scalar::Isa;
 use udd::tape::Tape;
 
 const START: [f64; 3] = [1.0, 1.0, 0.01];
-const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-11 };
+const TOLERANCE: Tolerance = Tolerance::new(1e-8, 1e-11);
 
 /// Steps to `end` without asking the heap for anything; returns their number.
 fn nothing_in_steps<M: System<f64, D>, const D: usize, K: Method<f64, D>>(

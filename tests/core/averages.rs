@@ -9,7 +9,7 @@ use udd::integrate::{Integrator, Tolerance, propagate};
 use udd::model::{Disk, DiskFamily, Dle, Family, Sides, System};
 use udd::scalar::Dual;
 
-const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-13 };
+const TIGHT: Tolerance = Tolerance::new(1e-12, 1e-13);
 
 /// Components for a state of up to four and up to six integrals.
 const T: usize = 10;

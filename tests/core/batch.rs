@@ -12,7 +12,7 @@ use udd::model::effects::Kind;
 use udd::model::{DiskFamily, DleFamily, Effect, Family};
 use udd::scalar::{Isa, Real};
 
-const TOLERANCE: Tolerance = Tolerance { rtol: 1e-9, atol: 1e-12 };
+const TOLERANCE: Tolerance = Tolerance::new(1e-9, 1e-12);
 
 /// Does work in every context: threads and instruction sets.
 fn on_each<T>(mut work: impl FnMut(ExecutionContext<'_>) -> T) -> Vec<(String, T)> {
@@ -149,7 +149,7 @@ fn reference_states() {
             values: &[vec![1.0, 0.0]],
             starts: &starts,
             times: &[0.0, 10.0, 30.0],
-            tolerance: Tolerance { rtol: 1e-13, atol: 1e-16 },
+            tolerance: Tolerance::new(1e-13, 1e-16),
             stepper,
         };
         let done = AtomicUsize::new(0);

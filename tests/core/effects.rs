@@ -193,7 +193,7 @@ proptest! {
 fn sensitivities_of_runs_agree_with_differences() {
     type N = Dual<f64, 1>;
     let x0 = [0.0, 1e-3, 0.04, 0.3];
-    let tight = Tolerance { rtol: 1e-12, atol: 1e-14 };
+    let tight = Tolerance::new(1e-12, 1e-14);
     for effect in all() {
         for (i, p) in effect.kind().unwrap().spec().parameters.iter().enumerate() {
             if p.role != Role::Amplitude {

@@ -37,7 +37,7 @@ type Problem = Estimator<DiskFamily, DiskCamera, 4, 3>;
 
 /// A camera's record of `n` frames of a run, with its true states.
 fn film(family: &DiskFamily, values: &[f64], n: usize, seed: u64) -> (Record<3>, Vec<[f64; 4]>) {
-    let tolerance = Tolerance { rtol: 1e-10, atol: 1e-12 };
+    let tolerance = Tolerance::new(1e-10, 1e-12);
     let disk = family.build(values);
     let mut noise = Noise(seed);
     let mut x = [1.0, 0.01, -0.02, 0.3];
@@ -69,7 +69,7 @@ fn film(family: &DiskFamily, values: &[f64], n: usize, seed: u64) -> (Record<3>,
 
 fn problem(family: DiskFamily, record: Record<3>, free: Vec<FreeParameter>) -> Problem {
     let diffusion = [3e-3, 1e-5, 1e-5, 1e-4].map(|q: f64| q / 0.04f64.sqrt());
-    let tolerance = Tolerance { rtol: 1e-8, atol: 1e-10 };
+    let tolerance = Tolerance::new(1e-8, 1e-10);
     Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance, known: None }
 }
 
@@ -162,7 +162,7 @@ proptest! {
         roles.push(Role::Clock);
         let mut estimator = problem(family, record, Vec::new());
         // Tight, so that the differences see the flow and not the integrator.
-        estimator.tolerance = Tolerance { rtol: 1e-13, atol: 1e-14 };
+        estimator.tolerance = Tolerance::new(1e-13, 1e-14);
         let states = vec![[omega, y, z, beta], [omega, y, z, beta]];
         let camera = vec![y0, 1e-3, tilt, 5e-3, 1e-3, -5e-4, lag, row, 1e-5, 0.01, 0.02, -0.01];
         let point = Unknowns { states, sets: vec![FilmParameters { model: values, camera, clock: 1e-3 }] };
@@ -212,7 +212,7 @@ proptest! {
 #[test]
 fn a_camera_follows_paths_to_the_second_order() {
     let disk = family(&[]).build(&PAPER);
-    let tolerance = Tolerance { rtol: 1e-13, atol: 1e-15 };
+    let tolerance = Tolerance::new(1e-13, 1e-15);
     let from_frame = |t: f64| propagate(&disk, 0.0, 0.02 + t, [7.0, 0.02, 0.03, 0.5], &tolerance).unwrap();
     let x = from_frame(0.0);
     let rate = disk.rates(0.02, &x, &sides_of(&disk, 0.02, &x));
@@ -368,7 +368,7 @@ fn filled_up<const D: usize>(
         record,
         free: (0..parameters).map(free).collect(),
         diffusion: [0.1; D],
-        tolerance: Tolerance { rtol: 1e-7, atol: 1e-9 },
+        tolerance: Tolerance::new(1e-7, 1e-9),
         known: None,
     };
     let model = [10.0, 28.0, 8.0 / 3.0, 1.0, 1.0, 1.0, 0.0][..parameters].to_vec();
@@ -418,7 +418,7 @@ fn estimate<const D: usize>(film: &[[f64; 3]]) -> Vec<f64> {
 fn idle_states_change_nothing() {
     let equations = ["10*(x1 - x0)", "x0*(28 - x2) - x1", "x0*x1 - 8/3*x2"];
     let family = FormulaFamily::<3>::parse(&names("x", 3), &equations, &[], &[]).unwrap();
-    let (system, tolerance) = (family.build::<f64>(&[]), Tolerance { rtol: 1e-10, atol: 1e-12 });
+    let (system, tolerance) = (family.build::<f64>(&[]), Tolerance::new(1e-10, 1e-12));
     let (mut noise, mut x, mut film) = (Noise(11), [-5.0, -6.0, 22.0], Vec::new());
     for _ in 0..90 {
         film.push(std::array::from_fn(|k| x[k] + 0.2 * noise.normal()));
@@ -463,7 +463,7 @@ fn derivatives_of_many_states_equal_finite_differences() {
         record,
         free: (0..14).map(free).collect(),
         diffusion: [1.0; D],
-        tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
+        tolerance: Tolerance::new(1e-12, 1e-12),
         known: None,
     };
     let model: Vec<f64> = (0..14).map(|p| 1.0 + 0.1 * p as f64).collect();

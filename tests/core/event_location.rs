@@ -48,7 +48,7 @@ fn the_disk_lands_on_its_surfaces_to_1e12() {
 fn a_run_over_kinks_converges_with_the_tolerance() {
     let disk = disk(0.088, false);
     let x0 = [3.0, 0.005, 0.0, 0.0];
-    let run = |rtol| propagate(&disk, 0.0, 3.0, x0, &Tolerance { rtol, atol: 1e-3 * rtol }).unwrap();
+    let run = |rtol| propagate(&disk, 0.0, 3.0, x0, &Tolerance::new(rtol, 1e-3 * rtol)).unwrap();
     let exact = run(1e-13);
     for rtol in [1e-6, 1e-8, 1e-10] {
         let x = run(rtol);
@@ -61,7 +61,7 @@ fn a_run_over_kinks_converges_with_the_tolerance() {
 #[test]
 fn tangents_pass_the_kinks() {
     type N = Dual<f64, 5>;
-    let tight = Tolerance { rtol: 1e-12, atol: 1e-14 };
+    let tight = Tolerance::new(1e-12, 1e-14);
     let plain = [0.088, 0.08, 9.81, 0.012, 0.103, 0.055];
     let x0 = [3.0, 0.005, 0.0, 0.0];
     let family = DiskFamily { effects: vec![], edge: false };
@@ -105,7 +105,7 @@ fn a_start_on_a_surface_takes_the_flow_s_side() {
 #[test]
 fn runs_go_backwards_too() {
     let disk = disk(0.088, false);
-    let tight = Tolerance { rtol: 1e-12, atol: 1e-15 };
+    let tight = Tolerance::new(1e-12, 1e-15);
     let x0 = [3.0, 0.005, 0.0, 0.0];
     let there = propagate(&disk, 0.0, 1.0, x0, &tight).unwrap();
     let back = propagate(&disk, 1.0, 0.0, there, &tight).unwrap();
@@ -203,7 +203,7 @@ proptest! {
     ) {
         let disk = disk(w, false);
         let rtol = 10f64.powf(-digits);
-        let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
+        let tolerance = Tolerance::new(rtol, 1e-3 * rtol);
         let x0 = [omega, y, z, 0.0];
         let mut driver: Integrator<_, f64, _> = Integrator::new(&disk, 0.0, x0, None, &tolerance);
         while driver.t() < 0.5 {
@@ -216,7 +216,7 @@ proptest! {
             // At 1e-12 a run of 0.5 s takes up to 1000 steps.
             prop_assert!(driver.counts().evaluations < 20_000, "{:?}", driver.counts());
         }
-        let tight = propagate(&disk, 0.0, 0.5, x0, &Tolerance { rtol: 1e-13, atol: 1e-16 }).unwrap();
+        let tight = propagate(&disk, 0.0, 0.5, x0, &Tolerance::new(1e-13, 1e-16)).unwrap();
         for n in 0..4 {
             // Errors of up to 100 steps, amplified by up to 100 over half a second.
             let allowed = 1e4 * rtol * [15.0, 0.1, 0.1, 5.0][n];
@@ -245,7 +245,7 @@ fn rest_is_no_obstacle() {
         (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     };
     for k in 0..600 {
-        let tolerance = Tolerance { rtol: [1e-9, 1e-7, 1e-6][k % 3], atol: [1e-12, 1e-10, 1e-9][k % 3] };
+        let tolerance = Tolerance::new([1e-9, 1e-7, 1e-6][k % 3], [1e-12, 1e-10, 1e-9][k % 3]);
         let built = disk.build(&[[0.0, 1e-6, 1e-4][k % 3], 0.08, 9.81, 0.012, 0.103, 0.055]);
         let start = [2.0 * uniform(), 0.1 * uniform(), 0.1 * uniform(), 0.0];
         let end = propagate(&built, 0.0, 60.0, start, &tolerance);
@@ -254,7 +254,7 @@ fn rest_is_no_obstacle() {
     let dry = Effect::new(Kind::Coulomb);
     let pendulum = PendulumFamily { effects: vec![dry] }.build(&[0.3, 0.09, 9.81, 0.05, 0.01, 0.05]);
     for k in 0..40 {
-        let tolerance = Tolerance { rtol: 1e-8, atol: [1e-9, 1e-12][k % 2] };
+        let tolerance = Tolerance::new(1e-8, [1e-9, 1e-12][k % 2]);
         let end = propagate(&pendulum, 0.0, 200.0, [0.0, 2.0 * uniform()], &tolerance).unwrap();
         // Dry friction smoothed over eps lets it creep to the bottom.
         assert!(end[0].abs() < 1e-6, "{end:?}");

@@ -27,7 +27,7 @@ fn failures<const D: usize>(family: &FormulaFamily<D>, centre: [f64; D], times: 
     let tape = Tape::record(family, &[None, None]).unwrap();
     assert!(!tape.is_unrolled());
     let (starts, values, stop) = (starts(21, centre), [VALUES.to_vec()], CancelFlag::new());
-    let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
+    let tolerance = Tolerance::new(rtol, 1e-3 * rtol);
     let run = |starts: &[[f64; D]], isa, threads| -> Vec<EnsembleRun<D>> {
         let done = AtomicUsize::new(0);
         let all =

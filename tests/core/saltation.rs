@@ -9,7 +9,7 @@ use udd::model::effects::{Effect, FrictionModel, Kind};
 use udd::model::{Disk, DiskFamily, Family, MAX_SURFACES, PendulumFamily, Sides, System, choose, sides_of};
 use udd::scalar::{Dual, Mask, Scalar};
 
-const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
+const TIGHT: Tolerance = Tolerance::new(1e-12, 1e-14);
 
 /// A block on a belt that moves at speed `v`, held by a spring: `x'' = -x + k` sliding, carried along while
 /// `x < s`. Friction at rest is larger than in motion, so that it goes on for ever.

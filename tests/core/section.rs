@@ -12,7 +12,7 @@ use udd::model::{DiskFamily, DleFamily, Family};
 use udd::scalar::Isa;
 use udd::tape::Tape;
 
-const TIGHT: Tolerance = Tolerance { rtol: 1e-13, atol: 1e-15 };
+const TIGHT: Tolerance = Tolerance::new(1e-13, 1e-15);
 const START: [f64; 3] = [1.0, 1.0, 0.01];
 const DISK: [f64; 6] = [0.014, 0.08, 9.81, 0.012, 0.103, 0.055];
 
@@ -285,7 +285,7 @@ fn rates_on_a_section_take_the_side_of_the_step() {
 #[test]
 fn laws_without_a_series_have_sections_too() {
     // The same section by the other method, which the sections fall back on: its polynomial is of order 4.
-    let tolerance = Tolerance { rtol: 1e-10, atol: 1e-13 };
+    let tolerance = Tolerance::new(1e-10, 1e-13);
     let found = dle(1.0, &[("z", 1)], How { tolerance, ..How::many(4) });
     let mut driver: Integrator<_, f64, 3, Tolerance, Dopri5<f64, 3>> =
         Integrator::new(DleFamily.build(&[1.0, 0.0]), 0.0, START, None, &tolerance);

@@ -4,7 +4,7 @@ use udd::integrate::{Tolerance, propagate};
 use udd::model::{Disk, DiskFamily, Dle, Family};
 
 fn tight() -> Tolerance {
-    Tolerance { rtol: 1e-15, atol: 1e-15 }
+    Tolerance::new(1e-15, 1e-15)
 }
 
 /// Asserts that `got` rounds to `wanted`, whose digits end at `unit`; one unit is left for the

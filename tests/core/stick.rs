@@ -14,7 +14,7 @@ use udd::observe::Event;
 use udd::scalar::{Isa, Mask, Packet, Real, Scalar};
 use udd::tape::Tape;
 
-const TIGHT: Tolerance = Tolerance { rtol: 1e-12, atol: 1e-14 };
+const TIGHT: Tolerance = Tolerance::new(1e-12, 1e-14);
 
 /// `x'' + x = -mu sgn x'`: a pendulum without weight whose cable turns it back.
 fn oscillator(mu: f64, treatment: FrictionModel, eps: f64) -> Pendulum<f64> {
@@ -503,7 +503,7 @@ fn bristles_at_rest_are_no_trap() {
     let disk = WithLuGre(DiskFamily { effects, edge: false }).build(&values);
     for k in 0..40 {
         let rtol = 4e-7 * 1.01f64.powi(k);
-        let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
+        let tolerance = Tolerance::new(rtol, 1e-3 * rtol);
         let start = [0.0, -0.0085, 0.0085, 0.0, 0.0];
         let mut driver: Integrator<_, f64, 5> = Integrator::new(&disk, 0.0, start, None, &tolerance);
         let mut before = 0.0;
@@ -540,7 +540,7 @@ proptest! {
         let values = [0.5, 0.25, 9.81, 0.01, 0.1, pull, c, eps, extra, 0.3, eps];
         let system = PendulumFamily { effects }.build(&values);
         let rtol = 10f64.powf(-digits);
-        let tolerance = Tolerance { rtol, atol: 1e-3 * rtol };
+        let tolerance = Tolerance::new(rtol, 1e-3 * rtol);
         let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, (&CancelFlag::new(), None));
         let run = run.unwrap();
         prop_assert_eq!(run.outcome, Outcome::Finished);

@@ -235,7 +235,7 @@ fn run<S: Scalar, const D: usize, const N: usize>(
     while t.less(end).any() {
         let sides = sides_of(system, S::lift(t), &x);
         jets.expand(tape, p, S::lift(t), &x, &sides);
-        let norm = Tolerance { rtol, atol: rtol * 1e-3 };
+        let norm = Tolerance::new(rtol, rtol * 1e-3);
         let h = jets.radius(jets.order(), &norm, &norm.weights(&x)).min(end - t);
         x = jets.at(h);
         t += h;
@@ -560,7 +560,7 @@ proptest! {
 fn a_radius_that_is_no_number() {
     let tape = Tape::record(&DleFamily, &[]).unwrap();
     let mut jets = Jets::<f64, 3, 21>::new(&tape, Isa::best());
-    let norm = Tolerance { rtol: 1e-9, atol: 1e-12 };
+    let norm = Tolerance::new(1e-9, 1e-12);
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         let x = [bad, 1.0, 1.0];
         jets.expand(&tape, &[1.0, 0.0], 0.0, &x, &[true; MAX_SURFACES]);

@@ -13,7 +13,7 @@ from udd.models import Model, require_model
 from udd.models.parameter_batch import default_state
 from udd.models.state_scaling import Floats
 from udd.simulation.batch import RunOptions
-from udd.simulation.trajectory import initial_state, tolerances
+from udd.simulation.trajectory import initial_state, longest_step, tolerances
 
 from .section_runs import SectionRunner
 
@@ -37,7 +37,8 @@ def section_runner(
     rtol, atol = tolerances(options["rtol"], options["atol"])
     mean = None if t_max is None else number("t_max", t_max, above=0.0) / each
     t_each = CLOCKS * clock_of(model, rows) if mean is None else mean
-    return SectionRunner(model, surfaces, ways, rtol, atol, thread_count(options["threads"]), t_each)
+    longest, threads = longest_step(options["max_step"]), thread_count(options["threads"])
+    return SectionRunner(model, surfaces, ways, rtol, atol, threads, t_each, longest)
 
 
 def start_states(model: Model, starts: ArrayLike | None) -> Floats:

@@ -57,7 +57,8 @@ def kinds_of(
             break
         time = share * float(np.nanmedian(np.ptp(found.t[open_], axis=1)))
         values, starts = np.ascontiguousarray(rows[open_]), np.ascontiguousarray(found.end[open_])
-        batch = Batch(runner.model, values, starts, runner.rtol, runner.atol, runner.threads)
+        limits = runner.rtol, runner.atol, runner.threads, None, runner.max_step
+        batch = Batch(runner.model, values, starts, *limits)
         got = _core.lyapunov(batch, True, time, 0.0, 1e-300)
         growth = got["value"] * got["time"][:, None]
         done = got["outcome"] == FINISHED

@@ -54,6 +54,7 @@ class SectionRunner:
     threads: int
     t_each: float
     """The longest time that a point may take on average."""
+    max_step: float
 
     def __call__(self, values: Floats, starts: Floats, skip: int, count: int) -> Crossings:
         """`count` points of each job after leaving out `skip`.
@@ -84,7 +85,7 @@ class SectionRunner:
         runs = np.flatnonzero(~outside)
         if len(runs):
             own, first = np.ascontiguousarray(values[runs]), np.ascontiguousarray(starts[runs])
-            batch = Batch(self.model, own, first, self.rtol, self.atol, self.threads)
+            batch = Batch(self.model, own, first, self.rtol, self.atol, self.threads, None, self.max_step)
             surfaces = list(zip(self.section, self.direction, strict=True))
             got = _core.sections(batch, surfaces, skip, count, self.t_each * (skip + count))
             columns = got["t"].shape[1]  # fewer after Ctrl-C

@@ -59,11 +59,12 @@ class Fate:
 
 @dataclass(frozen=True)
 class Orbit:
-    """Orbits of a model, run with these tolerances."""
+    """Orbits of a model, run with these tolerances and this longest step."""
 
     model: Model
     rtol: float
     atol: float
+    longest: float = np.inf
 
     @cached_property
     def kept(self) -> NDArray[np.intp]:
@@ -85,6 +86,8 @@ class Orbit:
         from .poincare_sections import poincare
 
         options = {"n": _POINTS, "transient": 0, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
+        if np.isfinite(self.longest):
+            options["max_step"] = self.longest
         return poincare(self.model, section, state0=start, **options)
 
     def points_if_any(

@@ -18,7 +18,7 @@ from udd.models.parameter_batch import default_state, parameter_batch
 from udd.simulation.batch import Batch
 from udd.simulation.below_tolerance import warn_of_some
 from udd.simulation.outcomes import FINISHED, OUTCOMES
-from udd.simulation.trajectory import initial_state, tolerances
+from udd.simulation.trajectory import initial_state, longest_step, tolerances
 
 __all__ = ["ConvergenceWarning", "lyapunov"]
 
@@ -30,6 +30,7 @@ class _Options(TypedDict, total=False):
     state0: ArrayLike | None
     rtol: float
     atol: float
+    max_step: float | None
     threads: int | None
     progress: bool | None
 
@@ -78,6 +79,7 @@ def lyapunov(
     state0: ArrayLike | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    max_step: float | None = None,
     threads: int | None = None,
     progress: bool | None = None,
     with_error: bool = False,
@@ -103,6 +105,8 @@ def lyapunov(
         Initial state. Where several attractors coexist it decides between them.
     rtol, atol : float
         Tolerances of the run.
+    max_step : float, optional
+        The longest step, as for :func:`udd.simulate`.
     threads : int, optional
         How many threads to use, by default one per core. No bit of the result depends on it.
     progress : bool, optional
@@ -172,6 +176,7 @@ def lyapunov(
     time, skipped = span(t, transient, longest=1e5 * time_scale, skip=400.0 * time_scale)
     goal = number("tol", 2e-3 / time_scale if tol is None else tol, above=0.0)
     rtol, atol = tolerances(rtol, atol)
+    longest = longest_step(max_step)
     start = initial_state(model, default_state(model) if state0 is None else state0)
     workers = thread_count(threads)
 
@@ -182,7 +187,7 @@ def lyapunov(
         for first in range(0, n, PORTION):
             part = slice(first, min(first + PORTION, n))
             rows = orbits.rows(part)
-            batch = Batch(model, rows, start[None, :], rtol, atol, workers, show(first))
+            batch = Batch(model, rows, start[None, :], rtol, atol, workers, show(first), longest)
             found = _core.lyapunov(batch, False, time, skipped, goal)
             if first == 0:
                 warn_of_some(model, rows, found["end"], min(time, LOOK * time_scale), rtol, atol)

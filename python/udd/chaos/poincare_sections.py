@@ -22,7 +22,7 @@ from udd.models.parameter_batch import orbits_of
 from udd.simulation.batch import RUN_OPTIONS, Batch, RunOptions
 from udd.simulation.below_tolerance import warn_of_some
 from udd.simulation.outcomes import OUTCOMES
-from udd.simulation.trajectory import tolerances
+from udd.simulation.trajectory import longest_step, tolerances
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -261,7 +261,7 @@ def poincare(
         The time at which an orbit ends in any case; by default 100 typical times of the motion for every
         crossing.
     **options
-        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the run; ``threads`` (by default one per core;
+        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the run; ``max_step``, its longest step; ``threads`` (by default one per core;
         the result does not depend on it); ``progress``, whether to show a progress bar (by default for many
         orbits in a terminal); ``partial``, after Ctrl-C to return what there is, with a warning, instead of
         raising it with the exception.
@@ -292,8 +292,10 @@ def poincare(
     Notes
     -----
     Steps are taken by a Taylor method, whose polynomials are as accurate as the steps; a crossing is a zero
-    of the expression on such a polynomial. Two crossings within an eighth of a step can be missed; a surface
-    that is only touched is not crossed.
+    of the expression on such a polynomial. Interval arithmetic divides a step until the expression has at most
+    one zero in each part, so none is missed and none is seen twice, however fast the expression changes; a
+    surface that is only touched is not crossed. What the steps do not see, as a smooth pulse of the law that is
+    shorter than they are, needs ``max_step``.
 
     Examples
     --------
@@ -309,6 +311,7 @@ def poincare(
     count, skipped = whole("n", n, 1), whole("transient", transient, 0)
     chosen = with_defaults("poincare", RUN_OPTIONS, options)
     rtol, atol = tolerances(chosen["rtol"], chosen["atol"])
+    longest = longest_step(chosen["max_step"])
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     if t_max is None:
         end = CLOCKS * clock_of(model, rows) * (count + skipped)
@@ -316,7 +319,7 @@ def poincare(
         end = number("t_max", t_max, above=0.0)
     jobs = max(len(rows), len(starts))
     with progress_bar(jobs, "orbit", chosen["progress"]) as since:
-        batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), since(0))
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), since(0), longest)
         found = _core.sections(batch, list(zip(surfaces, ways, strict=True)), skipped, count, end)
     names = np.array(OUTCOMES)[found["outcome"]]
     numbers = found["found"].astype(np.int64)

@@ -19,7 +19,7 @@ from udd.models.parameter_batch import default_state
 from udd.simulation.batch import Batch
 from udd.simulation.below_tolerance import warn_from
 from udd.simulation.outcomes import FAILED, FINISHED, OUTCOMES
-from udd.simulation.trajectory import initial_state, tolerances
+from udd.simulation.trajectory import initial_state, longest_step, tolerances
 
 from .fate import Fate, Orbit
 from .largest_exponent import LOOK, reason, span
@@ -113,6 +113,7 @@ def lyapunov_spectrum(
     section: str | Sequence[str] | None = None,
     rtol: float = 1e-9,
     atol: float = 1e-12,
+    max_step: float | None = None,
 ) -> Spectrum:
     """All Lyapunov exponents of an orbit, and a verdict on its motion.
 
@@ -136,6 +137,8 @@ def lyapunov_spectrum(
         state, `end`, which has the transient behind it.
     rtol, atol : float
         Tolerances of the run.
+    max_step : float, optional
+        The longest step, as for :func:`udd.simulate`.
 
     Returns
     -------
@@ -189,7 +192,7 @@ def lyapunov_spectrum(
     rtol, atol = tolerances(rtol, atol)
     start = initial_state(model, default_state(model) if state0 is None else state0)
 
-    run = _Run(model, rtol, atol)
+    run = _Run(model, rtol, atol, longest_step(max_step))
     if section is not None:
         run.refuse(section, start)
     found, fate = run.look(start, time, skipped, goal)
@@ -319,7 +322,7 @@ class _Run(Orbit):
 
     def __call__(self, start: _Floats, time: float, skipped: float, goal: float) -> _core._Orbits:
         row = np.array([list(self.model.parameters.values())])
-        batch = Batch(self.model, row, start[None, :], self.rtol, self.atol)
+        batch = Batch(self.model, row, start[None, :], self.rtol, self.atol, max_step=self.longest)
         return _core.lyapunov(batch, True, time, skipped, goal)
 
     def look(self, start: _Floats, time: float, skipped: float, goal: float) -> tuple[_core._Orbits, Fate]:
@@ -416,6 +419,7 @@ def covariant_vectors(
     transient: float | None = None,
     rtol: float = 1e-9,
     atol: float = 1e-12,
+    max_step: float | None = None,
 ) -> Covariant:
     """Covariant Lyapunov vectors and finite-time exponents along an orbit.
 
@@ -434,6 +438,8 @@ def covariant_vectors(
         default 200, or 50 s.
     rtol, atol : float
         Tolerances of the run.
+    max_step : float, optional
+        The longest step, as for :func:`udd.simulate`.
 
     Returns
     -------
@@ -471,13 +477,14 @@ def covariant_vectors(
     step = number("dt", 0.5 * time_scale if dt is None else dt, above=0.0)
     aside = number("transient", 200.0 * time_scale if transient is None else transient, least=0.0)
     rtol, atol = tolerances(rtol, atol)
+    longest = longest_step(max_step)
     start = initial_state(model, default_state(model) if state0 is None else state0)
     count = n + 2.0 * aside / step  # infinite where dt is tiny
     require_memory(
         f"{count:.6g} intervals", int(min(count, 1e300)), itemsize=8 * len(start) * (4 * len(start) + 3)
     )
     extra = int(np.ceil(aside / step))
-    found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol)
+    found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol, longest)
     kept = slice(extra, extra + n + 1)
     times: _Floats = step * np.arange(extra, extra + n + 1, dtype=np.float64)
     return Covariant(

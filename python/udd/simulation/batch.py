@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypedDict
@@ -28,6 +29,8 @@ class Batch:
         0 for one per core.
     progress : callable, optional
         Called with the number of runs that are done.
+    max_step : float
+        The longest step.
     """
 
     model: Model
@@ -37,6 +40,7 @@ class Batch:
     atol: float
     threads: int = 1
     progress: Callable[[int], object] | None = None
+    max_step: float = math.inf
 
 
 class RunOptions(TypedDict, total=False):
@@ -46,6 +50,8 @@ class RunOptions(TypedDict, total=False):
     ----------
     rtol, atol : float
         Tolerances of the runs.
+    max_step : float, optional
+        The longest step; by default only the error limits it.
     threads : int, optional
         By default one per core. No result depends on it.
     progress : bool, optional
@@ -56,9 +62,17 @@ class RunOptions(TypedDict, total=False):
 
     rtol: float
     atol: float
+    max_step: float | None
     threads: int | None
     progress: bool | None
     partial: bool
 
 
-RUN_OPTIONS: RunOptions = {"rtol": 1e-9, "atol": 1e-12, "threads": None, "progress": None, "partial": False}
+RUN_OPTIONS: RunOptions = {
+    "rtol": 1e-9,
+    "atol": 1e-12,
+    "max_step": None,
+    "threads": None,
+    "progress": None,
+    "partial": False,
+}

@@ -20,7 +20,7 @@ from .batch import Batch
 from .below_tolerance import warn_of_some
 from .model_inputs import driven
 from .outcomes import OUTCOMES
-from .trajectory import checked_times, method_for, tolerances
+from .trajectory import checked_times, longest_step, method_for, tolerances
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,6 +90,7 @@ def ensemble(
     parameters: Mapping[str, ArrayLike] | None = None,
     rtol: float = 1e-9,
     atol: float = 1e-12,
+    max_step: float | None = None,
     method: str = "auto",
     threads: int | None = None,
     progress: bool | None = None,
@@ -109,7 +110,7 @@ def ensemble(
     parameters : mapping of str to array_like, optional
         Other values of some of the model's parameters, of shapes that broadcast with one another and with
         the leading axes of `state0`; the result has these axes.
-    rtol, atol : float
+    rtol, atol, max_step : float
         As for :func:`udd.simulate`.
     method : {"auto", "taylor", "dopri5", "dop853"}
         As for :func:`udd.simulate`; ``"auto"`` is the fastest at equal error.
@@ -157,6 +158,7 @@ def ensemble(
     True
     """
     rtol, atol = tolerances(rtol, atol)
+    longest = longest_step(max_step)
     times, wanted = checked_times(t), slice(None)
     if isinstance(times, float):  # of the way there only the end is kept
         times, wanted = np.array([0.0, times] if times else [0.0]), slice(-1, None)
@@ -168,7 +170,7 @@ def ensemble(
     if stepper == "rodas":
         raise ModelError('method="rodas" is for single runs, by udd.simulate')
     with progress_bar(runs, "run", progress) as since:
-        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), since(0))
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), since(0), longest)
         found = _core.ensemble(batch, times, stepper)
     names = np.array(OUTCOMES)[found["outcome"]]
     states = found["states"][:, wanted]

@@ -222,6 +222,11 @@ def tolerances(rtol: float, atol: float) -> tuple[float, float]:
     return rtol, atol
 
 
+def longest_step(max_step: float | None) -> float:
+    """A checked longest step, infinite where none is given."""
+    return math.inf if max_step is None else number("max_step", max_step, above=0.0)
+
+
 def checked_times(t: ArrayLike) -> NDArray[np.float64] | float:
     """Checked times at which states are wanted, or the end of a run from 0."""
     times = array("t", t)
@@ -253,6 +258,7 @@ def simulate(
     *,
     rtol: float = 1e-9,
     atol: float = 1e-12,
+    max_step: float | None = None,
     method: str = "dopri5",
     dense: bool = False,
     inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
@@ -271,6 +277,9 @@ def simulate(
     rtol, atol : float
         Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
         in the state's units.
+    max_step : float, optional
+        The longest step; by default only the error limits it. Without it a smooth pulse that is shorter than a
+        step can be missed.
     method : {"dopri5", "dop853", "taylor", "rodas", "auto"}
         ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
         theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
@@ -327,7 +336,9 @@ def simulate(
     >>> print(np.round(udd.simulate(mass, [0, 1, 2], [0, 0], inputs={"force": push}).x, 12))
     [0.         0.16666667 1.33333333]
     """
-    found = integrated(model, t, state0, rtol=rtol, atol=atol, method=method, dense=dense, inputs=inputs)
+    found = integrated(
+        model, t, state0, rtol=rtol, atol=atol, max_step=max_step, method=method, dense=dense, inputs=inputs
+    )
     if found.outcome == "ejected":
         warnings.warn(
             f"the disk left the wheels at t = {found.t[-1]:.6g} s, where the run ends; a disk with "
@@ -346,6 +357,7 @@ def integrated(
     *,
     rtol: float = 1e-9,
     atol: float = 1e-12,
+    max_step: float | None = None,
     method: str = "dopri5",
     dense: bool = False,
     inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
@@ -353,13 +365,14 @@ def integrated(
     """The same for who looks at the outcome: a run that leaves the disk is not warned of."""
     state = initial_state(model, state0)
     rtol, atol = tolerances(rtol, atol)
+    longest = longest_step(max_step)
     stepper = method_for(model, method, rtol)
     times = checked_times(t)
     model = driven(model, np.array([0.0, times]) if isinstance(times, float) else times, inputs)
     if isinstance(times, float):
-        found = _core.simulate(model, None, times, state.tolist(), rtol, atol, stepper, dense)
+        found = _core.simulate(model, None, times, state.tolist(), rtol, atol, longest, stepper, dense)
     else:
-        found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, stepper, dense)
+        found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, longest, stepper, dense)
     events = Events(tuple(found["event_kind"]), found["event_t"], found["event_state"])
     stats = Stats(*found["counts"])
     return Trajectory(found["t"], found["state"], events, found["outcome"], stats, model, found["dense"])

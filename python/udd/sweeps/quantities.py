@@ -7,6 +7,7 @@ trajectory. A trajectory that fails has an outcome and NaN, and disturbs no othe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -22,7 +23,7 @@ from udd.models import Model
 from udd.models.parameter_batch import outside_domain
 from udd.simulation.batch import Batch
 from udd.simulation.outcomes import EJECTED, FAILED, FINISHED, INTERRUPTED, OUTCOMES
-from udd.simulation.trajectory import integrated, method_for, tolerances
+from udd.simulation.trajectory import integrated, longest_step, method_for, tolerances
 
 NOT_RUN = -1
 """In the array ``outcome`` before the work is done; the others are those of `udd.simulation.outcomes`."""
@@ -54,11 +55,17 @@ class Quantity:
 
 def _chosen(given: Mapping[str, Any], defaults: Mapping[str, float | None]) -> dict[str, Any]:
     for name in given:
-        if name not in defaults:
-            raise ModelError(f"there is no option {name!r}; there are {', '.join(defaults)}")
+        if name not in (*defaults, "max_step"):
+            raise ModelError(f"there is no option {name!r}; there are {', '.join(defaults)}, max_step")
     chosen = {**defaults, **given}
     chosen["rtol"], chosen["atol"] = tolerances(chosen["rtol"], chosen["atol"])
+    if "max_step" in given:
+        chosen["max_step"] = longest_step(given["max_step"])
     return chosen
+
+
+def _longest(options: Options) -> float:
+    return float(options.get("max_step", math.inf))
 
 
 def _time_unit(model: Model) -> str:
@@ -109,7 +116,7 @@ def _spectrum(
     model: Model, rows: Floats, states: Floats, options: Options, threads: int, all: bool = True
 ) -> Found:
     time = options["t"], options["transient"], options["tol"]
-    batch = Batch(model, rows, states, options["rtol"], options["atol"], threads)
+    batch = Batch(model, rows, states, options["rtol"], options["atol"], threads, None, _longest(options))
     found = _core.lyapunov(batch, all, *time)
     done = found["outcome"] == FINISHED
     return {
@@ -159,24 +166,25 @@ def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads:
 def _ended(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
     times, rtol, atol = np.array([0.0, options["t"]]), options["rtol"], options["atol"]
     if "bristle" in model.state_names:
-        return _ended_one_by_one(model, rows, states, times, rtol, atol)
+        return _ended_one_by_one(model, rows, states, times, options)
     method = method_for(model, "auto", rtol)
-    found = _core.ensemble(Batch(model, rows, states, rtol, atol, threads), times, method)
+    found = _core.ensemble(
+        Batch(model, rows, states, rtol, atol, threads, None, _longest(options)), times, method
+    )
     if (found["outcome"] == INTERRUPTED).any():
         raise KeyboardInterrupt
     return {name: found[name] for name in ("t_end", "end", "outcome")}
 
 
-def _ended_one_by_one(
-    model: Model, rows: Floats, states: Floats, times: Floats, rtol: float, atol: float
-) -> Found:
+def _ended_one_by_one(model: Model, rows: Floats, states: Floats, times: Floats, options: Options) -> Found:
     """For friction by bristles, which ensembles do not have."""
+    limits = {name: options.get(name) for name in ("rtol", "atol", "max_step")}
     t_end, ends = np.full(len(states), np.nan), np.full(states.shape, np.nan)
     outcome = np.full(len(states), FAILED, dtype=np.int8)
     for k, (row, state) in enumerate(zip(rows, states, strict=True)):
         one = model.with_parameters(dict(zip(model.parameters, row.tolist(), strict=True)))
         try:
-            run = integrated(one, times, state, rtol=rtol, atol=atol, method="auto")
+            run = integrated(one, times, state, method="auto", **limits)
         except IntegrationError:
             continue
         t_end[k], ends[k], outcome[k] = run.t[-1], run.state[-1], OUTCOMES.index(run.outcome)

@@ -2,10 +2,12 @@
 
 use crate::analysis::batch::lanes::LaneBatch;
 use crate::analysis::poincare::dense_output::{DenseOutput, Room, Scanned};
+use crate::analysis::poincare::hidden::SectionCurve;
 use crate::analysis::poincare::section::Section;
-use crate::analysis::poincare::sign_changes::{Side, Stretch, judge, leave_out};
+use crate::analysis::poincare::sign_changes::{Side, Stretch, in_doubt, judge, leave_out};
 use crate::formula::{Binary, Expression, Leaf, Op, Place};
 use crate::integrate::root::bracketed;
+use crate::integrate::zeros::{Bracket, Polynomials, Search, resolved, sign_changes};
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
 use crate::scalar::{Isa, Mask, Real};
@@ -35,7 +37,8 @@ pub struct Crossing<const D: usize> {
 enum Form {
     /// A component of the state less a constant: its own polynomial is all that is needed.
     Component(usize, f64),
-    Any,
+    /// As slow as the state, or not.
+    Any { steady: bool },
 }
 
 impl Form {
@@ -45,15 +48,19 @@ impl Form {
             [Op::Push(Leaf::State(n)), Op::Push(Leaf::Number(value)), Op::Binary(Binary::Sub)] => {
                 Form::Component(n, value)
             }
-            _ => Form::Any,
+            _ => Form::Any { steady: function.is_slow() },
         }
+    }
+
+    fn is_steady(self) -> bool {
+        !matches!(self, Form::Any { steady: false })
     }
 }
 
 /// What a function may ask for beside the time and the state.
-struct Law<'a, M, R: Real> {
+pub(super) struct Law<'a, M, R: Real> {
     system: &'a M,
-    parameters: &'a [R],
+    pub parameters: &'a [R],
     /// The sides that the law is taken on.
     sides: &'a Sides<R>,
 }
@@ -61,7 +68,7 @@ struct Law<'a, M, R: Real> {
 /// The value of any function. A function of its own: there would be too many copies of all that a formula
 /// can contain.
 #[inline(never)]
-fn general<M: System<R, D>, R: Real, const D: usize>(
+pub(super) fn general<M: System<R, D>, R: Real, const D: usize>(
     function: &Expression,
     stack: &mut [R],
     law: &Law<'_, M, R>,
@@ -107,10 +114,18 @@ pub struct Scan<'a, R: Real, const D: usize> {
     skip: R,
     /// Whether these need only be counted: a single surface that has no poles.
     counted: bool,
+    /// How many each lane wants, and whether it is too late for more.
+    count: usize,
+    stopped: &'a (dyn Fn() -> bool + 'a),
 }
 
 impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
-    pub fn new(sections: &'a [Section], isa: Isa) -> Self {
+    pub fn new(
+        sections: &'a [Section],
+        isa: Isa,
+        count: usize,
+        stopped: &'a (dyn Fn() -> bool + 'a),
+    ) -> Self {
         let never = R::mask(false);
         let surface = |section: &'a Section| Surface {
             section,
@@ -133,6 +148,8 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             crossed: Vec::with_capacity(R::LANES * MOST_PROBES * sections.len()),
             skip: R::zero(),
             counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
+            count,
+            stopped,
         }
     }
 
@@ -180,7 +197,21 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             let mut stretches =
                 [Stretch { s: R::zero(), value: R::zero(), crossing: R::mask(false) }; MOST_PROBES];
             let stretches = &mut stretches[..K::PROBES.len()];
-            surface.signs(&law, &step, moved, stretches);
+            let mut before = surface.side;
+            before.moved = moved;
+            let doubt = surface.signs(&law, &step, moved, stretches).and(moved);
+            if doubt.any() {
+                let limits = (self.count, self.skip, self.stopped);
+                let found = surface.look_closer(&law, &step, (before, doubt), stretches, limits);
+                for (lane, bracket) in found {
+                    let left = self.skip.lane(lane);
+                    if self.counted && left > 0.0 {
+                        self.skip.set_lane(lane, left - 1.0);
+                    } else if let Some(crossing) = surface.between(&law, &step, lane, bracket, which) {
+                        self.crossed.push((lane, crossing));
+                    }
+                }
+            }
             let last = stretches[stretches.len() - 1].value;
             if self.counted && crosses(stretches) {
                 leave_out(stretches, &mut self.skip);
@@ -229,7 +260,7 @@ impl<R: Real> Surface<'_, R> {
     fn at<M: System<R, D>, const D: usize>(&mut self, law: &Law<'_, M, R>, t: &R, x: &[R; D]) -> R {
         match self.form {
             Form::Component(n, less) => x[n] - R::constant(less),
-            Form::Any => general(&self.section.function, &mut self.stack, law, (t, x)),
+            Form::Any { .. } => general(&self.section.function, &mut self.stack, law, (t, x)),
         }
     }
 
@@ -244,7 +275,8 @@ impl<R: Real> Surface<'_, R> {
         self.at(law, &(step.from + s * step.polynomials.unit), &step.polynomials.state(s))
     }
 
-    /// Looks where the function changes its sign: after which of the method's places before.
+    /// Looks where the function changes its sign: after which of the method's places before. Returns the lanes where it may
+    /// do so elsewhere too.
     #[inline(always)]
     fn signs<M: System<R, D>, const D: usize>(
         &mut self,
@@ -252,16 +284,16 @@ impl<R: Real> Surface<'_, R> {
         step: &Step<'_, R, D>,
         moved: R::Mask,
         stretches: &mut [Stretch<R>],
-    ) {
+    ) -> R::Mask {
         // At the end it is the state itself, from which the next step starts.
         let end = self.at(law, &step.end.0, step.end.1);
         let side = Side { moved, ..self.side };
-        let after = match self.form {
+        let (after, doubt) = match self.form {
             Form::Component(n, less) => {
                 let scan = Scanned { less, probes: step.probes, size: step.size, end, side };
                 step.polynomials.signs(n, scan, stretches)
             }
-            Form::Any => {
+            Form::Any { steady } => {
                 let (mut s, mut values) = ([R::zero(); MOST_PROBES], [end; MOST_PROBES]);
                 for (i, &theta) in step.probes.iter().enumerate() {
                     s[i] = step.size.scale(theta);
@@ -269,11 +301,93 @@ impl<R: Real> Surface<'_, R> {
                         values[i] = self.inside(law, step, s[i]);
                     }
                 }
-                judge(&s, &values, side, stretches)
+                let values = &values[..step.probes.len()];
+                let doubt = if steady { in_doubt(self.value, values) } else { R::mask(true) };
+                (judge(&s, values, side, stretches), doubt)
             }
         };
         self.side.below = choose(moved, after.below, self.side.below);
         self.side.above = choose(moved, after.above, self.side.above);
+        doubt
+    }
+
+    /// Looks in lanes in doubt for all changes of sign. Where there are others than the stretches show, these are left to
+    /// what is returned, in the order of time in each lane.
+    #[inline(never)]
+    fn look_closer<M: System<R, D>, const D: usize>(
+        &mut self,
+        law: &Law<'_, M, R>,
+        step: &Step<'_, R, D>,
+        (before, doubt): (Side<R>, R::Mask),
+        stretches: &mut [Stretch<R>],
+        (count, skip, stopped): (usize, R, &dyn Fn() -> bool),
+    ) -> Vec<(usize, Bracket)> {
+        let mut all = Vec::new();
+        let last = stretches.len() - 1;
+        for lane in doubt.lanes() {
+            let mut values = [self.value.lane(lane); MOST_PROBES + 1];
+            for (value, stretch) in values[1..].iter_mut().zip(stretches.iter()) {
+                *value = stretch.value.lane(lane);
+            }
+            let values = &values[..=last + 1];
+            if self.form.is_steady() && resolved(values) {
+                continue;
+            }
+            let size = step.size.lane(lane);
+            let terms =
+                |n: usize, k: usize| step.polynomials.component(n).get(k).map_or(0.0, |c| c.lane(lane));
+            let terms = Polynomials::new(step.polynomials.component(0).len(), size, terms);
+            let span = (step.from.lane(lane), size * step.polynomials.unit.lane(lane));
+            let mut curve =
+                SectionCurve::new(&self.section.function, &mut self.stack, law, lane, span, terms);
+            let (below, above) = (before.below.lane(lane), before.above.lane(lane));
+            let known = (below || above).then_some((0.0, values[0], below));
+            let wanted = count.saturating_add(skip.lane(lane) as usize);
+            let patient = |pieces: usize| pieces % 4096 != 0 || !stopped();
+            let mut found = Vec::new();
+            sign_changes(&mut curve, known, (values[0], values[last + 1]), &patient, &mut |bracket| {
+                let falls = bracket.high.1 < 0.0;
+                if falls && before.falling || !falls && before.rising {
+                    found.push(bracket);
+                }
+                if found.len() < wanted { Search::Next } else { Search::Enough }
+            });
+            // Where the places showed as many, each is between two of them.
+            let shown: Vec<usize> = (0..=last).filter(|&i| stretches[i].crossing.lane(lane)).collect();
+            let within = |(&i, own): (&usize, &Bracket)| {
+                let from = if i == 0 { 0.0 } else { stretches[i - 1].s.lane(lane) / size };
+                from <= own.low.0 && own.high.0 <= stretches[i].s.lane(lane) / size
+            };
+            if shown.len() == found.len() && shown.iter().zip(&found).all(within) {
+                continue;
+            }
+            let others = R::Mask::from_lanes(|i| i != lane);
+            stretches.iter_mut().for_each(|own| own.crossing = own.crossing.and(others));
+            let scaled = |(s, value): (f64, f64)| (s * size, value);
+            all.extend(
+                found.iter().map(|own| (lane, Bracket { low: scaled(own.low), high: scaled(own.high) })),
+            );
+        }
+        all
+    }
+
+    /// The crossing of a lane in a bracket, where it is one.
+    fn between<M: System<R, D>, const D: usize>(
+        &mut self,
+        law: &Law<'_, M, R>,
+        step: &Step<'_, R, D>,
+        lane: usize,
+        Bracket { low, high }: Bracket,
+        which: u8,
+    ) -> Option<Crossing<D>> {
+        let scale = low.1.abs().max(high.1.abs());
+        let tiny = (scale * ZERO).min(SMALL);
+        let s = bracketed(|s: f64| self.inside(law, step, R::constant(s)).lane(lane), low, high, tiny, true);
+        let s = R::constant(s);
+        let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
+        let residual = self.at(law, &t, &x).lane(lane);
+        let x = vector!(f64, D; n => x[n].lane(lane));
+        (residual.abs() < scale * JUMP).then_some(Crossing { t: t.lane(lane), x, which, residual })
     }
 
     /// As [`find`](Surface::find), whatever the method of a single run.
@@ -320,7 +434,7 @@ impl<R: Real> Surface<'_, R> {
             let tiny = scale.scale(ZERO).min(R::constant(SMALL));
             let s = match self.form {
                 Form::Component(n, less) => step.polynomials.root(n, less, low, high, tiny, seen),
-                Form::Any => bracketed(|s| self.inside(law, step, s), low, high, tiny, seen),
+                Form::Any { .. } => bracketed(|s| self.inside(law, step, s), low, high, tiny, seen),
             };
             let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
             let residual = self.at(law, &t, &x);

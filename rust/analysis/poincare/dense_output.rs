@@ -1,6 +1,6 @@
 //! The polynomials of a step, looked at with the best instructions that there are.
 
-use crate::analysis::poincare::sign_changes::{Side, Stretch, judge};
+use crate::analysis::poincare::sign_changes::{Side, Stretch, in_doubt, judge};
 use crate::integrate::{MOST_PROBES, Method};
 use crate::model::choose;
 use crate::scalar::{InstructionSet, Isa, Mask, Packet, Real, Scalar, Work};
@@ -46,9 +46,14 @@ impl<'a, R: Real, const D: usize> DenseOutput<'a, R, D> {
         vector!(R, D; n => R::work(self.isa, At { c: self.coefficients[n], s }))
     }
 
-    /// Looks where a component crosses a value.
+    /// The coefficients of a component.
+    pub fn component(&self, n: usize) -> &'a [R] {
+        self.coefficients[n]
+    }
+
+    /// Looks where a component crosses a value; returns the sides after that, and the lanes in doubt.
     #[inline(always)]
-    pub fn signs(&self, n: usize, scan: Scanned<'_, R>, stretches: &mut [Stretch<R>]) -> Side<R> {
+    pub fn signs(&self, n: usize, scan: Scanned<'_, R>, stretches: &mut [Stretch<R>]) -> (Side<R>, R::Mask) {
         R::work(self.isa, Signs { c: self.coefficients[n], scan, stretches })
     }
 
@@ -120,29 +125,33 @@ struct Signs<'a, R: Real> {
 }
 
 impl<R: Real> Work for Signs<'_, R> {
-    type Output = Side<R>;
+    type Output = (Side<R>, R::Mask);
 
     #[inline(always)]
-    fn run<V: InstructionSet>(self) -> Side<R> {
+    fn run<V: InstructionSet>(self) -> (Side<R>, R::Mask) {
         let Scanned { less, probes, size, end, side } = self.scan;
         let mut s = [R::zero(); MOST_PROBES];
         for i in 0..probes.len() {
             s[i] = size.scale(probes[i]);
         }
         let mut values = [end; MOST_PROBES];
+        let start = self.c[0] - R::constant(less);
         if const { R::LANES == 1 } {
             // One trajectory: the places side by side, all of them, as vector instructions want it.
             let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
             let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
-            let level = Packet::constant(less);
-            let all_below = side.below.any() && !found.less(level).not().any() && end.less(R::zero()).any();
-            let all_above = side.above.any() && !level.less(found).not().any() && R::zero().less(end).any();
+            // By as much as it changes in the step it has to stay away.
+            let middle = found.lane(MOST_PROBES / 2 - 1) - less;
+            let change = (middle - start.lane(0)).abs() + (end.lane(0) - middle).abs();
+            let (low, high) = (Packet::constant(less - change), Packet::constant(less + change));
+            let all_below = side.below.any() && !found.less(low).not().any() && end.less(R::zero()).any();
+            let all_above = side.above.any() && !high.less(found).not().any() && R::zero().less(end).any();
             if all_below || all_above {
                 // As in most steps, no crossing.
                 if let [.., last] = self.stretches {
                     *last = Stretch { s: size, value: end, crossing: R::mask(false) };
                 }
-                return side;
+                return (side, R::mask(false));
             }
             for i in 0..MOST_PROBES {
                 values[i] = R::constant(found.lane(i)) - R::constant(less);
@@ -153,7 +162,8 @@ impl<R: Real> Work for Signs<'_, R> {
                 values[i] = value(self.c, s[i], |c| c) - R::constant(less);
             }
         }
-        judge(&s, &values, side, self.stretches)
+        let doubt = in_doubt(start, &values[..probes.len()]);
+        (judge(&s, &values, side, self.stretches), doubt)
     }
 }
 

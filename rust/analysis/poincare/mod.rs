@@ -2,5 +2,6 @@
 
 pub(crate) mod crossing;
 pub(crate) mod dense_output;
+mod hidden;
 pub(crate) mod section;
 pub(crate) mod sign_changes;

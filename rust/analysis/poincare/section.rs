@@ -137,7 +137,8 @@ impl<F: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob for Collect<'_,
         let start = |job| self.sections.start::<R>(job);
         let mut batch =
             LaneBatch::new(self.isa, family, |values| self.recipe.make(values), start(first), &tolerance);
-        let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa);
+        let stopped = || queue.stopped();
+        let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa, count, &stopped);
         // What each lane has found.
         let mut found_by: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];
         for lane in 0..queue.lanes::<R>() {

@@ -1,6 +1,11 @@
 //! On which side of a surface lanes are, and where they change it.
 
+use crate::integrate::MOST_PROBES;
 use crate::scalar::{Mask, Real};
+
+/// How far a function bends between places, times this, is less than the sum of two neighbours where nothing is hidden
+/// between them.
+const CLEAR: f64 = 4.0;
 
 /// On which side of a surface the lanes are, in which direction crossing it counts, and in which lanes.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +48,24 @@ pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Str
         above = high.or(above.and(low.not())).and(sane);
     }
     Side { below, above, ..side }
+}
+
+/// Lanes where the values at equidistant places, the first of them at the start, do not show that there are no other
+/// changes of sign: they bend too much for how far they are from zero, or from one another.
+#[inline(always)]
+pub fn in_doubt<R: Real>(start: R, values: &[R]) -> R::Mask {
+    let (mut least, mut bend) = (R::constant(f64::INFINITY), R::zero());
+    let (mut last, mut before) = (start, start);
+    for i in 0..values.len() {
+        let value = values[i];
+        least = least.min(last.abs() + value.abs());
+        // Every other one will do where there are many.
+        if i % 2 == 1 || values.len() < MOST_PROBES && i > 0 {
+            bend = bend.max((value - last.scale(2.0) + before).abs());
+        }
+        (before, last) = (last, value);
+    }
+    bend.scale(CLEAR).less(least).not()
 }
 
 /// Takes away the first crossings of lanes that still leave some out, so many as `skip` says.

@@ -101,6 +101,17 @@ pub struct Term<S> {
 }
 
 impl<S: Scalar> Term<S> {
+    /// The same law with its numbers changed.
+    pub fn map<T: Scalar>(&self, number: impl Fn(S) -> T) -> Term<T> {
+        let law = match &self.law {
+            EffectLaw::Library(kind, values) => EffectLaw::Library(*kind, values.map(number)),
+            EffectLaw::Formula(formula, values) => {
+                EffectLaw::Formula(formula.clone(), values.iter().map(|&own| number(own)).collect())
+            }
+        };
+        Term { law, momentum: self.momentum, treatment: self.treatment }
+    }
+
     /// The effects with their values taken one after the other from `values`.
     pub fn list(effects: &[Effect], mut values: &[S]) -> Vec<Self> {
         let mut terms = Vec::with_capacity(effects.len());
