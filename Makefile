@@ -35,7 +35,7 @@ endif
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install edit demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
+.PHONY: help install edit demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-crossings bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -108,6 +108,9 @@ bench-fit: .venv/.ready-user ## what fits of simulated films take on one core (A
 
 bench-states: .venv/.ready-user ## what steps and fits take by the number of states, 2 to 12, on one core (ARGS="--turns 9")
 	$(PY) benches/python/states.py $(ARGS)
+
+bench-crossings: .venv/.ready-user ## sections and switches with known answers: none missed, none seen twice (ARGS="--cases 10000 --jobs 2")
+	$(STEP) "bench-crossings" $(PY) benches/python/crossings.py $(ARGS)
 
 bench-discovery: .venv/.ready-user ## what the loop finds in drawn records (ARGS="--batches three,nulls --records 3 --jobs 2")
 	$(STEP) "bench-discovery" $(PY) benches/python/discovery $(ARGS)

@@ -6,6 +6,8 @@
 //! its step anew up to there, and [`EventIteration`] corrects the step's size until the surface's function is
 //! zero; the other lanes go on meanwhile.
 
+use std::cell::Cell;
+
 use super::method::{Course, MOST_PROBES, Method, StepStart};
 use super::root::bracketed;
 use super::tolerance::Tolerance;
@@ -269,23 +271,23 @@ where
                     early = new;
                 }
             }
-            let mut open = lanes.and(look.suspect[target]);
-            if target != WALL {
-                open = open.and(scale.less(S::Real::constant(self.noise)).not());
-            }
+            let steady = self.is_steady(target);
+            let least = S::Real::constant(if target == WALL { 0.0 } else { self.noise });
+            let open = lanes.and(look.suspect[target]);
             let values = &values[..=method.probes().len()];
             for lane in open.lanes() {
                 let shown = |value: &S::Real| value.lane(lane);
-                if self.is_steady(target) && resolved(&values.iter().map(shown).collect::<Vec<_>>()) {
+                let quiet = || scale.lane(lane) < least.lane(lane);
+                if steady && (quiet() || resolved(&values.iter().map(shown).collect::<Vec<_>>())) {
                     continue;
                 }
                 let only = S::Mask::from_lanes(|i| i == lane);
-                match self.first_crossing(
-                    target,
-                    method,
-                    (h, lane),
-                    (shown(&start), shown(&values[values.len() - 1]), shown(&scale)),
-                ) {
+                let ends = (shown(&start), shown(&values[values.len() - 1]));
+                // Of a fast function the places say little.
+                let most = Cell::new(scale.lane(lane));
+                let located = self.first_crossing(target, method, (h, lane), ends, &most);
+                scale.set_lane(lane, most.get());
+                match located {
                     Located::Between(from, to) => {
                         let lift =
                             |(dt, value): (f64, f64)| (S::Real::constant(dt), S::Real::constant(value));
@@ -294,7 +296,8 @@ where
                         wrong = wrong.or(only);
                         early = choose(only, S::mask(from.0 == 0.0), early);
                     }
-                    Located::Nowhere => {}
+                    Located::Nowhere => wrong = wrong.and(only.not()),
+                    Located::Unknown => {}
                     Located::Before(dt) => {
                         let nearer = S::Real::constant(dt);
                         let nearer = S::Real::select(nearer.abs().less(found.cut.abs()), nearer, found.cut);
@@ -302,7 +305,7 @@ where
                     }
                 }
             }
-            let mut crossing = open.and(wrong);
+            let mut crossing = open.and(wrong).and(scale.less(least).not());
             if !crossing.any() {
                 continue;
             }
@@ -340,9 +343,10 @@ where
         target: usize,
         method: &dyn Course<S, D>,
         (h, lane): (S::Real, usize),
-        (first, last, scale): (f64, f64, f64),
+        (first, last): (f64, f64),
+        most: &Cell<f64>,
     ) -> Located {
-        let Some(laws) = self.system.enclosing(lane) else { return Located::Nowhere };
+        let Some(laws) = self.system.enclosing(lane) else { return Located::Unknown };
         let mut coefficients = Vec::new();
         let unit = method.polynomial(&mut coefficients).lane(lane);
         let size = h.lane(lane);
@@ -353,6 +357,7 @@ where
             target,
             lane,
             step: (self.at.t.lane(lane), size),
+            most,
             polynomials: Polynomials::new(coefficients.len(), size / unit, coefficient),
             laws,
             sides: self.at.sides.map(|side| Enclosed::mask(side.lane(lane))),
@@ -364,8 +369,7 @@ where
             let value = |s: f64| self.on(target, method, S::Real::constant(s * size)).lane(lane);
             places.map(|s| -value(s)).fold(0.0, f64::max)
         };
-        let error = LIFT_OFF * (self.noise + self.rtol * scale);
-        let on_start = first.abs() <= error;
+        let error = || LIFT_OFF * (self.noise + self.rtol * most.get());
         let (mut located, mut doubtful) = (Located::Nowhere, None);
         let between = |own: Bracket| {
             let place = |(s, value): (f64, f64)| (s * size, value);
@@ -375,9 +379,9 @@ where
         let far = sign_changes(&mut curve, start, (first, last), &patient, &mut |bracket| {
             match doubtful.take() {
                 // Back from where the start led.
-                Some(before) if depth(0.0, bracket.high.0) > error => located = between(before),
+                Some(before) if depth(0.0, bracket.high.0) > error() => located = between(before),
                 Some(_) => return Search::Next,
-                None if on_start && bracket.low.0 == 0.0 => {
+                None if first.abs() <= error() && bracket.low.0 == 0.0 => {
                     doubtful = Some(bracket);
                     return Search::Next;
                 }
@@ -397,6 +401,7 @@ where
 
 /// Where a lane first crosses a target.
 enum Located {
+    Unknown,
     Nowhere,
     /// Times after the start of the step, and the values there.
     Between((f64, f64), (f64, f64)),
@@ -412,6 +417,8 @@ struct TargetCurve<'a, M, S: Scalar, const D: usize> {
     lane: usize,
     /// When it begins and how long it is.
     step: (f64, f64),
+    /// The largest value so far.
+    most: &'a Cell<f64>,
     polynomials: Polynomials<D>,
     laws: Box<dyn EnclosedSurfaces<D> + 'a>,
     sides: Sides<Enclosed>,
@@ -420,7 +427,9 @@ struct TargetCurve<'a, M, S: Scalar, const D: usize> {
 impl<M: System<S, D>, S: Scalar, const D: usize> Curve for TargetCurve<'_, M, S, D> {
     fn value(&mut self, s: f64) -> f64 {
         let dt = S::Real::constant(s * self.step.1);
-        self.monitor.on(self.target, self.method, dt).lane(self.lane)
+        let value = self.monitor.on(self.target, self.method, dt).lane(self.lane);
+        self.most.set(self.most.get().max(value.abs()));
+        value
     }
 
     fn enclose(&mut self, a: f64, b: f64) -> Enclosed {

@@ -82,10 +82,10 @@ def basins(
     t_max : float, optional
         The longest time for the first ``transient + n`` points; by default generous.
     **options
-        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``max_step``, their longest step; ``threads`` (by default one per
-        core); ``progress``, whether to show a progress bar on stderr (by default where that is a terminal);
-        ``partial``, after Ctrl-C to return what there is, with a warning, instead of raising it with the
-        exception.
+        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``max_step``,
+        their longest step; ``threads`` (by default one per core); ``progress``, whether to show a progress
+        bar on stderr (by default where that is a terminal); ``partial``, after Ctrl-C to return what there
+        is, with a warning, instead of raising it with the exception.
 
     Returns
     -------

@@ -103,10 +103,10 @@ def bifurcation(
         n`` points; ``perturbation`` (1e-4): what is added to a state that is carried over, relative to the
         size of the motion, lest it stay on an orbit that is no longer stable; ``match_distance`` (0.25):
         how far an attractor's points may move, on average and relative to the size of the motion, from one
-        value to the next; ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``max_step``, their longest step; ``threads`` (by
-        default one per core); ``progress``, whether to show a progress bar on stderr (by default where that
-        is a terminal); ``partial``, after Ctrl-C to return what there is, with a warning, instead of
-        raising it with the exception.
+        value to the next; ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs;
+        ``max_step``, their longest step; ``threads`` (by default one per core); ``progress``, whether to
+        show a progress bar on stderr (by default where that is a terminal); ``partial``, after Ctrl-C to
+        return what there is, with a warning, instead of raising it with the exception.
 
     Returns
     -------

@@ -35,6 +35,7 @@ _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 # Named surfaces of a component X: the zero of its rate, and the direction that the name implies.
 _EXTREMA = {"maxima": -1, "minima": 1, "turning points": 0}
 _EXTREMUM = re.compile(rf"({'|'.join(_EXTREMA)}) of (\w+)")
+_SMALL = 1e-3  # the size of states down to which the usual absolute tolerance is small
 CLOCKS = 100.0  # typical times that a crossing may take on average
 
 
@@ -261,10 +262,11 @@ def poincare(
         The time at which an orbit ends in any case; by default 100 typical times of the motion for every
         crossing.
     **options
-        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the run; ``max_step``, its longest step; ``threads`` (by default one per core;
-        the result does not depend on it); ``progress``, whether to show a progress bar (by default for many
-        orbits in a terminal); ``partial``, after Ctrl-C to return what there is, with a warning, instead of
-        raising it with the exception.
+        ``rtol`` (1e-9) and ``atol`` (1e-12, less for starts below 1e-3), the tolerances of the run;
+        ``max_step``, its longest step; ``threads`` (by default one per core; the result does not depend on
+        it); ``progress``, whether to show a progress bar (by default for many orbits in a terminal);
+        ``partial``, after Ctrl-C to return what there is, with a warning, instead of raising it with the
+        exception.
 
     Returns
     -------
@@ -292,10 +294,9 @@ def poincare(
     Notes
     -----
     Steps are taken by a Taylor method, whose polynomials are as accurate as the steps; a crossing is a zero
-    of the expression on such a polynomial. Interval arithmetic divides a step until the expression has at most
-    one zero in each part, so none is missed and none is seen twice, however fast the expression changes; a
-    surface that is only touched is not crossed. What the steps do not see, as a smooth pulse of the law that is
-    shorter than they are, needs ``max_step``.
+    of the expression on such a polynomial. Where the expression may have several zeros, interval arithmetic
+    divides the step until each part has at most one, however fast the expression changes. A surface that is
+    only touched is not crossed. A smooth pulse of the law that is shorter than a step may need ``max_step``.
 
     Examples
     --------
@@ -313,6 +314,8 @@ def poincare(
     rtol, atol = tolerances(chosen["rtol"], chosen["atol"])
     longest = longest_step(chosen["max_step"])
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
+    if "atol" not in options:
+        atol *= _smallness(starts)
     if t_max is None:
         end = CLOCKS * clock_of(model, rows) * (count + skipped)
     else:
@@ -398,6 +401,12 @@ def _surface(model: Model, text: str, direction: str | None) -> tuple[str, int]:
     return text, _DIRECTIONS[direction or "up"]
 
 
+def _smallness(starts: _Floats) -> float:
+    """Return the factor of the usual absolute tolerance for orbits that start close to zero."""
+    size = float(np.abs(starts).max(initial=0.0))
+    return min(1.0, size / _SMALL) if size > 0 else 1.0
+
+
 def clock_of(model: Model, rows: _Floats) -> float:
     """A typical time between crossings, that of the slowest orbit; `rows` are the orbits' parameters."""
     p = dict(zip(model.parameters, rows.T, strict=True))
@@ -407,6 +416,17 @@ def clock_of(model: Model, rows: _Floats) -> float:
     return 1.0 / max(slowest, 1e-6)
 
 
+def _hint(section: Section) -> str:
+    """Name the section to ask for instead of an angle, which has each value once."""
+    for name in section.model.angles:
+        for text in section.section:
+            plain = re.fullmatch(rf"\s*{name}\s*(?:(?:=|-)\s*([\w.*/+-]+))?\s*", text)
+            if plain is not None:
+                less = f" - {plain[1]}" if plain[1] else ""
+                return f"; {name} is not taken modulo 2 pi: try the section 'sin({name}{less})'"
+    return ""
+
+
 def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Section, partial: bool) -> None:
     """Tell of orbits with fewer points."""
     short = outcome != OUTCOMES.index("finished")
@@ -414,10 +434,13 @@ def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Sect
         return
     kinds, counts = np.unique(outcome[short], return_counts=True)
     if len(outcome) == 1:
-        message = f"the orbit has {int(found[0])} crossings instead of {n}: {OUTCOMES[kinds[0]]}"
+        message = (
+            f"the orbit has {int(found[0])} crossings instead of {n}: {OUTCOMES[kinds[0]]}{_hint(section)}"
+        )
     else:
         whys = ", ".join(f"{OUTCOMES[kind]} {count}" for kind, count in zip(kinds, counts, strict=True))
         message = f"{int(short.sum())} of {len(outcome)} orbits have fewer than {n} crossings: {whys}"
+        message += _hint(section)
     if (outcome == OUTCOMES.index("interrupted")).any():
         interrupted(lambda: section, message, partial)
     else:

@@ -278,8 +278,8 @@ def simulate(
         Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
         in the state's units.
     max_step : float, optional
-        The longest step; by default only the error limits it. Without it a smooth pulse that is shorter than a
-        step can be missed.
+        The longest step; by default only the error limits it. Without it a smooth pulse that is shorter than
+        a step can be missed.
     method : {"dopri5", "dop853", "taylor", "rodas", "auto"}
         ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
         theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the

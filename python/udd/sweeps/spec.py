@@ -49,9 +49,9 @@ class SweepSpec:
     state0 : array_like, shape (dim,), optional
         The initial state, for the components that are not varied; by default that of :func:`udd.lyapunov`.
     options : mapping of str to float, optional
-        "lyapunov" and "spectrum": `t`, `tol`, `transient`, `rtol`, `atol` and `max_step` as in :func:`udd.lyapunov`.
-        "final_state" and "outcome": the length `t` of the runs, `rtol`, `atol` and `max_step`; they are those of
-        :func:`udd.ensemble`.
+        "lyapunov" and "spectrum": `t`, `tol`, `transient`, `rtol`, `atol` and `max_step` as in
+        :func:`udd.lyapunov`. "final_state" and "outcome": the length `t` of the runs, `rtol`, `atol` and
+        `max_step`; they are those of :func:`udd.ensemble`.
     chunk : int
         How many trajectories are computed and written at once, at most.
 

@@ -7,7 +7,7 @@ use crate::analysis::poincare::section::Section;
 use crate::analysis::poincare::sign_changes::{Side, Stretch, in_doubt, judge, leave_out};
 use crate::formula::{Binary, Expression, Leaf, Op, Place};
 use crate::integrate::root::bracketed;
-use crate::integrate::zeros::{Bracket, Polynomials, Search, resolved, sign_changes};
+use crate::integrate::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes};
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
 use crate::scalar::{Isa, Mask, Real};
@@ -18,6 +18,8 @@ const ZERO: f64 = 1e-14;
 const SMALL: f64 = 1e-13;
 /// A start this close to a surface is on it: on which side, the flow says.
 const ON: f64 = 1e-12;
+/// Of states that are smaller than this in all components, a surface is as much closer.
+const TINY: f64 = 1e-6;
 /// A change of sign where the function stays above this part of its values nearby is a jump or a pole.
 const JUMP: f64 = 1e-6;
 
@@ -162,11 +164,15 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
     {
         self.sides = *batch.driver.sides();
         self.skip = R::select(lanes, R::constant(skip as f64), self.skip);
+        // Of states that are small altogether, as much smaller.
+        let x = batch.driver.x();
+        let size = x.iter().fold(R::zero(), |most, own| most.max(own.abs()));
+        let on = size.scale(ON / TINY).min(R::constant(ON));
         let law = Law { system: batch.driver.system(), parameters: batch.values(), sides: &self.sides };
         for surface in &mut self.surfaces {
             let value = surface.at(&law, &batch.driver.t(), batch.driver.x());
             surface.value = R::select(lanes, value, surface.value);
-            let (on, side) = (R::constant(ON), &mut surface.side);
+            let (on, side) = (on, &mut surface.side);
             side.below = choose(lanes, value.less(-on), side.below);
             side.above = choose(lanes, on.less(value), side.above);
         }
@@ -203,11 +209,13 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             if doubt.any() {
                 let limits = (self.count, self.skip, self.stopped);
                 let found = surface.look_closer(&law, &step, (before, doubt), stretches, limits);
-                for (lane, bracket) in found {
+                for (lane, bracket, smooth) in found {
                     let left = self.skip.lane(lane);
                     if self.counted && left > 0.0 {
                         self.skip.set_lane(lane, left - 1.0);
-                    } else if let Some(crossing) = surface.between(&law, &step, lane, bracket, which) {
+                    } else if let Some(crossing) =
+                        surface.between(&law, &step, lane, (bracket, smooth), which)
+                    {
                         self.crossed.push((lane, crossing));
                     }
                 }
@@ -312,7 +320,7 @@ impl<R: Real> Surface<'_, R> {
     }
 
     /// Looks in lanes in doubt for all changes of sign. Where there are others than the stretches show, these are left to
-    /// what is returned, in the order of time in each lane.
+    /// what is returned, in the order of time in each lane: with whether the function surely has no jump or pole there.
     #[inline(never)]
     fn look_closer<M: System<R, D>, const D: usize>(
         &mut self,
@@ -321,7 +329,7 @@ impl<R: Real> Surface<'_, R> {
         (before, doubt): (Side<R>, R::Mask),
         stretches: &mut [Stretch<R>],
         (count, skip, stopped): (usize, R, &dyn Fn() -> bool),
-    ) -> Vec<(usize, Bracket)> {
+    ) -> Vec<(usize, Bracket, bool)> {
         let mut all = Vec::new();
         let last = stretches.len() - 1;
         for lane in doubt.lanes() {
@@ -364,9 +372,10 @@ impl<R: Real> Surface<'_, R> {
             let others = R::Mask::from_lanes(|i| i != lane);
             stretches.iter_mut().for_each(|own| own.crossing = own.crossing.and(others));
             let scaled = |(s, value): (f64, f64)| (s * size, value);
-            all.extend(
-                found.iter().map(|own| (lane, Bracket { low: scaled(own.low), high: scaled(own.high) })),
-            );
+            for own in &found {
+                let smooth = curve.enclose(own.low.0, own.high.0).d[0].width().is_finite();
+                all.push((lane, Bracket { low: scaled(own.low), high: scaled(own.high) }, smooth));
+            }
         }
         all
     }
@@ -377,7 +386,7 @@ impl<R: Real> Surface<'_, R> {
         law: &Law<'_, M, R>,
         step: &Step<'_, R, D>,
         lane: usize,
-        Bracket { low, high }: Bracket,
+        (Bracket { low, high }, smooth): (Bracket, bool),
         which: u8,
     ) -> Option<Crossing<D>> {
         let scale = low.1.abs().max(high.1.abs());
@@ -387,7 +396,7 @@ impl<R: Real> Surface<'_, R> {
         let (t, x) = (step.from + s * step.polynomials.unit, step.polynomials.state(s));
         let residual = self.at(law, &t, &x).lane(lane);
         let x = vector!(f64, D; n => x[n].lane(lane));
-        (residual.abs() < scale * JUMP).then_some(Crossing { t: t.lane(lane), x, which, residual })
+        (smooth || residual.abs() < scale * JUMP).then_some(Crossing { t: t.lane(lane), x, which, residual })
     }
 
     /// As [`find`](Surface::find), whatever the method of a single run.
