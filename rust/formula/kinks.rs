@@ -73,7 +73,7 @@ pub struct Kinks {
     pub surfaces: Vec<Expression>,
     /// Whether a formula jumps there.
     pub jumps: Vec<bool>,
-    /// Whether their functions are linear in the state, and so no faster than it.
+    /// Whether their functions are no faster than the state.
     pub steady: Vec<bool>,
     /// Those that a law may [slide](crate::model::sliding_mode) on: where it jumps at a linear function of the states
     /// in the rate of one of them.
@@ -132,7 +132,7 @@ impl Kinks {
             return None;
         }
         let own = Expression::of(ops);
-        self.steady.push(own.is_affine());
+        self.steady.push(own.is_steady());
         self.surfaces.push(own);
         self.jumps.push(false);
         Some(self.surfaces.len() - 1)

@@ -263,7 +263,17 @@ impl Expression {
 
     /// Whether it is a linear function of the state and a constant, with factors that neither time nor inputs change.
     pub fn is_affine(&self) -> bool {
-        // Of each number on the stack: its degree in the state, 2 for all that is neither constant nor linear.
+        self.degree(2) == 1
+    }
+
+    /// Whether it is a constant or a linear function of the state and of time: no faster than the state.
+    pub fn is_steady(&self) -> bool {
+        self.degree(1) <= 1
+    }
+
+    /// Its degree in the state, where that of time counts as this; 2 for all that is neither constant nor linear.
+    fn degree(&self, time: u8) -> u8 {
+        // Of each number on the stack.
         let mut degrees: Vec<u8> = Vec::new();
         for op in &self.ops {
             let of = degrees.split_off(degrees.len() - op.takes());
@@ -271,6 +281,7 @@ impl Expression {
             let degree = match *op {
                 Op::Push(Leaf::State(_)) => 1,
                 Op::Push(Leaf::Number(_) | Leaf::Parameter(_)) => 0,
+                Op::Push(Leaf::Time) => time,
                 Op::Push(_) | Op::On(..) | Op::Where => 2,
                 Op::Unary(Unary::Neg) | Op::Binary(Binary::Add | Binary::Sub) => most,
                 Op::Binary(Binary::Mul) => of.iter().sum::<u8>().min(2),
@@ -280,7 +291,7 @@ impl Expression {
             };
             degrees.push(degree);
         }
-        degrees == [1]
+        degrees[0]
     }
 
     /// Its value.

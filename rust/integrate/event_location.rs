@@ -277,8 +277,10 @@ where
             let values = &values[..=method.probes().len()];
             for lane in open.lanes() {
                 let shown = |value: &S::Real| value.lane(lane);
+                let mut own = [0.0; MOST_PROBES + 1];
+                own.iter_mut().zip(values).for_each(|(own, value)| *own = shown(value));
                 let quiet = || scale.lane(lane) < least.lane(lane);
-                if steady && (quiet() || resolved(&values.iter().map(shown).collect::<Vec<_>>())) {
+                if steady && (quiet() || resolved(&own[..values.len()])) {
                     continue;
                 }
                 let only = S::Mask::from_lanes(|i| i == lane);

@@ -50,7 +50,7 @@ impl Form {
             [Op::Push(Leaf::State(n)), Op::Push(Leaf::Number(value)), Op::Binary(Binary::Sub)] => {
                 Form::Component(n, value)
             }
-            _ => Form::Any { steady: function.is_slow() },
+            _ => Form::Any { steady: function.is_steady() || function.is_slow() },
         }
     }
 
@@ -373,7 +373,10 @@ impl<R: Real> Surface<'_, R> {
             stretches.iter_mut().for_each(|own| own.crossing = own.crossing.and(others));
             let scaled = |(s, value): (f64, f64)| (s * size, value);
             for own in &found {
-                let smooth = curve.enclose(own.low.0, own.high.0).d[0].width().is_finite();
+                let slope = curve.enclose(own.low.0, own.high.0).d[0];
+                // What the law's rates make of it may have jumped since the last step.
+                let same = own.low.0 > 0.0 || (curve.value(0.0) < 0.0) == (own.low.1 < 0.0);
+                let smooth = slope.width().is_finite() && same;
                 all.push((lane, Bracket { low: scaled(own.low), high: scaled(own.high) }, smooth));
             }
         }
