@@ -250,8 +250,8 @@ impl Expression {
             .any(|op| matches!(op, Op::Push(Leaf::Rate(_) | Leaf::State(_) | Leaf::Time | Leaf::Input(_))))
     }
 
-    /// Whether it changes no faster than the state and its rates: it is made of these, parameters and numbers by sums,
-    /// products and low powers.
+    /// Returns true if it changes no faster than the state and its rates: it consists of these, parameters and numbers, in
+    /// sums, products and low powers.
     pub fn is_slow(&self) -> bool {
         self.ops.iter().all(|op| match *op {
             Op::Push(leaf) => !matches!(leaf, Leaf::Time | Leaf::Input(_)),
@@ -273,7 +273,7 @@ impl Expression {
 
     /// Its degree in the state, where that of time counts as this; 2 for all that is neither constant nor linear.
     fn degree(&self, time: u8) -> u8 {
-        // Of each number on the stack.
+        // One for each number on the stack.
         let mut degrees: Vec<u8> = Vec::new();
         for op in &self.ops {
             let of = degrees.split_off(degrees.len() - op.takes());

@@ -1,8 +1,8 @@
 //! Landing on switching surfaces and on the wall.
 //!
 //! A step is taken with the side of every surface frozen. Then [`SurfaceMonitor::find`] looks on the step's
-//! polynomial for the first place where a surface's sign contradicts its side: a few places show it of surfaces that are
-//! as slow as the state, [`sign_changes`] of all others and where these places leave it open. A lane that crosses takes
+//! polynomial for the first place where a surface's sign contradicts its side. For surfaces that are as slow as the state
+//! a few places are enough; [`sign_changes`] decides on all others, and where these places leave it open. A lane that crosses takes
 //! its step anew up to there, and [`EventIteration`] corrects the step's size until the surface's function is
 //! zero; the other lanes go on meanwhile.
 
@@ -33,7 +33,7 @@ const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 const NOISE: f64 = 1e-14;
-/// How far a function bends between places, times this, is less than the sum of two neighbours where it has no zero.
+/// A function has no zero between two places if its bend, times this, is less than the sum of the two values.
 const CLEAR: f64 = 4.0;
 /// A step with more pieces to look at is cut where they end.
 const MOST_PIECES: usize = 1 << 16;
@@ -122,7 +122,7 @@ pub struct SurfaceMonitor<'a, M, S: Scalar, const D: usize> {
     wall: bool,
     /// A surface whose function stays below this in a step is left alone: the step's error is larger.
     noise: f64,
-    /// What a step's error may be, as a part of the function.
+    /// The relative error of a step.
     rtol: f64,
 }
 
@@ -203,7 +203,7 @@ where
         let parts = &probes.parts[..places];
         let zero = S::Real::zero();
         let mut beyond = S::mask(false);
-        // The sum of neighbours, and by how much a value differs from their mean.
+        // The sum of two neighbours, and the second difference.
         let (mut least, mut bend) = (S::Real::constant(f64::INFINITY), zero);
         let (mut last, mut before) = (zero, zero);
         for i in 0..places {
@@ -285,7 +285,7 @@ where
                 }
                 let only = S::Mask::from_lanes(|i| i == lane);
                 let ends = (shown(&start), shown(&values[values.len() - 1]));
-                // Of a fast function the places say little.
+                // The largest value of a fast function may lie between the places.
                 let most = Cell::new(scale.lane(lane));
                 let located = self.first_crossing(target, method, (h, lane), ends, &most);
                 scale.set_lane(lane, most.get());

@@ -315,7 +315,7 @@ where
 
         let longest = self.norm.state().max_step;
         if longest.is_finite() {
-            // The last step may be longer than the others by as much as is left for it below.
+            // The last step takes up to 1 % more, see below.
             run.h = run.h.abs().min(S::Real::constant(longest / 1.01)).zip(run.h, f64::copysign);
         }
         let cut = run.h.abs().scale(1.01).less(remaining.abs()).not();
@@ -493,7 +493,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         let mut last = last;
         let cut = clear.and(found.cut.finite());
         if cut.any() {
-            // What comes behind is not known yet.
+            // The rest of the step has not been searched.
             if method.series() {
                 let x = method.at(found.cut);
                 trial.x = vector!(S, D; n => S::select(cut, x[n], trial.x[n]));

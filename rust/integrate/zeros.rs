@@ -10,10 +10,10 @@ use crate::scalar::{Dual, Enclosed, Interval, Scalar};
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// A piece is noise where its values spread at most this many times as far as rounding spreads those of one place.
 const NOISE: f64 = 4.0;
-/// Of pieces halved this often it is asked whether they are noise, and again after as many halvings.
+/// After each so many halvings a piece is checked for being noise.
 const SHALLOW: u32 = 4;
-/// How far the values at equidistant places bend, times these, is less than their distance from zero, or from one
-/// another, where nothing is hidden between them.
+/// Nothing is hidden between two places if the bend of the values, times these, is less than their distance from zero, or
+/// from one another.
 const DIP: f64 = 1.0;
 const TURN: f64 = 2.0;
 
@@ -32,7 +32,7 @@ pub struct Bracket {
     pub high: (f64, f64),
 }
 
-/// What whoever looks for changes of sign wants next.
+/// The answer of a visitor: whether to search on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
     Next,
@@ -42,9 +42,8 @@ pub enum Search {
 /// The side of zero that a function was last on, and where.
 pub type Known = Option<(f64, f64, bool)>;
 
-/// Shows `visit` the changes of sign from 0 to 1, in this order. `before` is the side at the start; at the end the
-/// function has the value `last`. Returns how far was looked: less than 1 where `patient`, which is told the number of
-/// pieces so far, ends the search.
+/// Shows `visit` the changes of sign from 0 to 1, in this order. `before` is the side at the start; `first` and `last` are
+/// the values at the ends. Returns the end of the searched part: less than 1 if `patient` refuses the number of pieces.
 pub fn sign_changes(
     curve: &mut dyn Curve,
     before: Known,
@@ -122,8 +121,8 @@ fn is_settled(
     false
 }
 
-/// Whether the values at equidistant places show that a function as slow as the step's polynomials has no zero between
-/// them that is not seen: the parabolas through them neither turn nor dip to zero where they do not show it.
+/// Returns true if the values at equidistant places show all zeros of a function that is as slow as the step's
+/// polynomials: between neighbours it neither turns nor dips to zero.
 pub fn resolved(values: &[f64]) -> bool {
     let bend = |i: usize| (values[i - 1] - 2.0 * values[i] + values[i + 1]).abs();
     let inner = 1..=values.len() - 2;
@@ -131,7 +130,6 @@ pub fn resolved(values: &[f64]) -> bool {
         let (a, b) = (values[i - 1], values[i]);
         let mut bend_here = bend(i.clamp(*inner.start(), *inner.end()));
         bend_here = bend_here.max(bend((i - 1).clamp(*inner.start(), *inner.end())));
-        // What is not a number shows nothing.
         (a - b).abs() > TURN * bend_here || a.abs().min(b.abs()) > DIP * bend_here || !(a - b).is_finite()
     })
 }

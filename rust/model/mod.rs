@@ -58,8 +58,8 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         S::one()
     }
 
-    /// Whether the function of surface `j` changes no faster than the state does, as linear functions of it: then a few
-    /// places within a step show how it bends. Of others the [enclosing](System::enclosing) laws say where they have zeros.
+    /// Returns true if the function of surface `j` changes no faster than the state, as a linear one does: then a few places
+    /// within a step show how it bends. The [enclosing](System::enclosing) law finds the zeros of all others.
     fn is_steady(&self, _j: usize, _sides: &Sides<S>) -> bool {
         true
     }

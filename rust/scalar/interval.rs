@@ -2,7 +2,7 @@
 //!
 //! A law evaluated over intervals encloses its values over a stretch of time and state (Moore, Interval Analysis, 1966);
 //! over [`Enclosed`] numbers it also encloses their slopes. The ends are rounded to nearest, so whoever asks pads what
-//! goes in. What is undefined somewhere in its argument is not a number, and neither is what is made of it.
+//! goes in. A function that is undefined somewhere in its argument gives NaN, and so does all that depends on it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -156,7 +156,7 @@ impl Scalar for Interval {
         self + a * b
     }
     fn less(self, other: Self) -> Truth {
-        // What is not a number may be anything.
+        // NaN may be anything.
         let impossible = self.low >= other.high;
         Truth { possible: !impossible, certain: self.high < other.low }
     }

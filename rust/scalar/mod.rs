@@ -119,7 +119,7 @@ pub trait Scalar:
     fn slope_of_jump(mask: Self::Mask, yes: Self, no: Self) -> Self {
         Self::select(mask, yes, no)
     }
-    /// Whether it stands for one number only, or one in each lane.
+    /// Returns false for an interval of several numbers.
     #[inline(always)]
     fn is_single(self) -> bool {
         true

@@ -49,7 +49,6 @@ def test_a_strobe_is_seen_whatever_the_solution_does(law: str) -> None:
     first = np.arccos(-0.9)
     right = np.sort([2 * np.pi * k + s * first for k in range(4) for s in (1, -1)])[1:7]
     assert crossed(model, "cos(t) + 0.9", 6, [0.5], direction="both") == pytest.approx(right, abs=1e-9)
-    # Of these only the second half.
     late = udd.poincare(model, "cos(t) + 0.9", 3, state0=[0.5], transient=3, direction="both").t
     assert late == pytest.approx(right[3:], abs=1e-9)
 

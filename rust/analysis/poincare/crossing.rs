@@ -18,7 +18,7 @@ const ZERO: f64 = 1e-14;
 const SMALL: f64 = 1e-13;
 /// A start this close to a surface is on it: on which side, the flow says.
 const ON: f64 = 1e-12;
-/// Of states that are smaller than this in all components, a surface is as much closer.
+/// If all components of a start are smaller than this, that distance shrinks in proportion.
 const TINY: f64 = 1e-6;
 /// A change of sign where the function stays above this part of its values nearby is a jump or a pole.
 const JUMP: f64 = 1e-6;
@@ -164,7 +164,6 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
     {
         self.sides = *batch.driver.sides();
         self.skip = R::select(lanes, R::constant(skip as f64), self.skip);
-        // Of states that are small altogether, as much smaller.
         let x = batch.driver.x();
         let size = x.iter().fold(R::zero(), |most, own| most.max(own.abs()));
         let on = size.scale(ON / TINY).min(R::constant(ON));
@@ -374,7 +373,7 @@ impl<R: Real> Surface<'_, R> {
             let scaled = |(s, value): (f64, f64)| (s * size, value);
             for own in &found {
                 let slope = curve.enclose(own.low.0, own.high.0).d[0];
-                // What the law's rates make of it may have jumped since the last step.
+                // A section of rates jumps where the law does: that is no crossing.
                 let same = own.low.0 > 0.0 || (curve.value(0.0) < 0.0) == (own.low.1 < 0.0);
                 let smooth = slope.width().is_finite() && same;
                 all.push((lane, Bracket { low: scaled(own.low), high: scaled(own.high) }, smooth));

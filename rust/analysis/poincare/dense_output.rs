@@ -140,7 +140,7 @@ impl<R: Real> Work for Signs<'_, R> {
             // One trajectory: the places side by side, all of them, as vector instructions want it.
             let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
             let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
-            // By as much as it changes in the step it has to stay away.
+            // Clear: farther from the level than it moves in the step.
             let middle = found.lane(MOST_PROBES / 2 - 1) - less;
             let change = (middle - start.lane(0)).abs() + (end.lane(0) - middle).abs();
             let (low, high) = (Packet::constant(less - change), Packet::constant(less + change));

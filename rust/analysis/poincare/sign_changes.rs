@@ -3,8 +3,7 @@
 use crate::integrate::MOST_PROBES;
 use crate::scalar::{Mask, Real};
 
-/// How far a function bends between places, times this, is less than the sum of two neighbours where nothing is hidden
-/// between them.
+/// Nothing is hidden between two places if the bend of the values, times this, is less than the sum of the two sizes.
 const CLEAR: f64 = 4.0;
 
 /// On which side of a surface the lanes are, in which direction crossing it counts, and in which lanes.
@@ -50,8 +49,8 @@ pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Str
     Side { below, above, ..side }
 }
 
-/// Lanes where the values at equidistant places, the first of them at the start, do not show that there are no other
-/// changes of sign: they bend too much for how far they are from zero, or from one another.
+/// Returns the lanes that may have other changes of sign than the values at equidistant places show: the values bend too
+/// much for their distance from zero and from one another.
 #[inline(always)]
 pub fn in_doubt<R: Real>(start: R, values: &[R]) -> R::Mask {
     let (mut least, mut bend) = (R::constant(f64::INFINITY), R::zero());
