@@ -359,13 +359,13 @@ impl<R: Real> Surface<'_, R> {
                 }
                 if found.len() < wanted { Search::Next } else { Search::Enough }
             });
-            // Where the places showed as many, each is between two of them.
+            // Where the places showed as many, these are the same.
             let shown: Vec<usize> = (0..=last).filter(|&i| stretches[i].crossing.lane(lane)).collect();
-            let within = |(&i, own): (&usize, &Bracket)| {
+            let same = |(&i, own): (&usize, &Bracket)| {
                 let from = if i == 0 { 0.0 } else { stretches[i - 1].s.lane(lane) / size };
-                from <= own.low.0 && own.high.0 <= stretches[i].s.lane(lane) / size
+                own.low.0 <= stretches[i].s.lane(lane) / size && from <= own.high.0
             };
-            if shown.len() == found.len() && shown.iter().zip(&found).all(within) {
+            if shown.len() == found.len() && shown.iter().zip(&found).all(same) {
                 continue;
             }
             let others = R::Mask::from_lanes(|i| i != lane);
@@ -374,8 +374,8 @@ impl<R: Real> Surface<'_, R> {
             for own in &found {
                 let slope = curve.enclose(own.low.0, own.high.0).d[0];
                 // A section of rates jumps where the law does: that is no crossing.
-                let same = own.low.0 > 0.0 || (curve.value(0.0) < 0.0) == (own.low.1 < 0.0);
-                let smooth = slope.width().is_finite() && same;
+                let steady = own.low.0 > 0.0 || (curve.value(0.0) < 0.0) == (own.low.1 < 0.0);
+                let smooth = slope.width().is_finite() && steady;
                 all.push((lane, Bracket { low: scaled(own.low), high: scaled(own.high) }, smooth));
             }
         }
