@@ -104,9 +104,9 @@ impl<S: Scalar> Term<S> {
     /// The same law with its numbers changed.
     pub fn map<T: Scalar>(&self, number: impl Fn(S) -> T) -> Term<T> {
         let law = match &self.law {
-            EffectLaw::Library(kind, values) => EffectLaw::Library(*kind, values.map(number)),
-            EffectLaw::Formula(formula, values) => {
-                EffectLaw::Formula(formula.clone(), values.iter().map(|&own| number(own)).collect())
+            ValuedLaw::Library(kind, values) => ValuedLaw::Library(*kind, values.map(number)),
+            ValuedLaw::Formula(formula, values) => {
+                ValuedLaw::Formula(formula.clone(), values.iter().map(|&own| number(own)).collect())
             }
         };
         Term { law, momentum: self.momentum, treatment: self.treatment }
