@@ -33,8 +33,8 @@ const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 const NOISE: f64 = 1e-14;
-/// A function has no zero between two places if its bend, times this, is less than the sum of the two values.
-const CLEAR: f64 = 4.0;
+/// A function has no zero in a step if its bend between quarters, times this, is less than its values near both ends.
+const CLEAR: f64 = 1.5;
 /// A step with more pieces to look at is cut where they end.
 const MOST_PIECES: usize = 1 << 16;
 /// A step that starts on a surface does not cross it by less than its error times this: a body that is let go first moves
@@ -201,29 +201,24 @@ where
             return S::mask(true);
         }
         let parts = &probes.parts[..places];
-        let zero = S::Real::zero();
+        let mut values = [S::Real::zero(); MOST_PROBES];
         let mut beyond = S::mask(false);
-        // The sum of two neighbours, and the second difference.
-        let (mut least, mut bend) = (S::Real::constant(f64::INFINITY), zero);
-        let (mut last, mut before) = (zero, zero);
         for i in 0..places {
             let x = vector!(S, D; n => S::lift(probes.states[i][n]));
-            let value = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
-            beyond = beyond.or(value.less(zero));
-            if i == 1 {
-                // The value at the start, on the straight line through the next two.
-                least = last.scale(3.0) - value;
-            }
-            if i > 0 {
-                least = least.min(last + value);
-            }
-            // Every other one will do where there are many.
-            if i > 1 && (places < MOST_PROBES || i % 2 == 0) {
-                bend = bend.max((value - last.scale(2.0) + before).abs());
-            }
-            (before, last) = (last, value);
+            values[i] = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
+            beyond = beyond.or(values[i].less(S::Real::zero()));
         }
-        beyond.or(bend.scale(CLEAR).less(least).not())
+        // Quarters of the step will do. A function that is farther from zero than it changes near both ends has no dip.
+        let stride = places / 4;
+        let (a, b, c, d) =
+            (values[stride - 1], values[2 * stride - 1], values[3 * stride - 1], values[4 * stride - 1]);
+        let least = a.min(d);
+        let mut doubt = ((a - b).abs() + (c - d).abs()).less(least).not();
+        if doubt.any() {
+            let bend = (a - b.scale(2.0) + c).abs().max((b - c.scale(2.0) + d).abs());
+            doubt = doubt.and(bend.scale(CLEAR).less(least).not());
+        }
+        beyond.or(doubt)
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.

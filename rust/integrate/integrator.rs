@@ -314,9 +314,8 @@ where
         let landing = if targets { run.landing.lanes() } else { S::mask(false) };
 
         let longest = self.norm.state().max_step;
-        if longest.is_finite() {
-            // The last step takes up to 1 % more, see below.
-            run.h = run.h.abs().min(S::Real::constant(longest / 1.01)).zip(run.h, f64::copysign);
+        if longest < f64::INFINITY {
+            run.limit(longest);
         }
         let cut = run.h.abs().scale(1.01).less(remaining.abs()).not();
         let mut h = S::Real::select(cut, remaining, run.h);
@@ -460,6 +459,14 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         for on in &mut self.landing.on {
             *on = on.and(lanes.not());
         }
+    }
+
+    /// Makes the next trial no longer than this.
+    #[cold]
+    #[inline(never)]
+    fn limit(&mut self, longest: f64) {
+        // The last step of a run takes up to 1 % more.
+        self.h = self.h.abs().min(S::Real::constant(longest / 1.01)).zip(self.h, f64::copysign);
     }
 
     /// Takes the law on these sides, in these lanes.

@@ -6,6 +6,9 @@ use crate::model::choose;
 use crate::scalar::{InstructionSet, Isa, Mask, Packet, Real, Scalar, Work};
 use crate::unroll::vector;
 
+/// A component is clear of a level that is farther away than this part of its change in a step.
+const NEAR: f64 = 0.125;
+
 /// The polynomials of a step, one for each component of the state, in their own unit of time.
 pub struct DenseOutput<'a, R: Real, const D: usize> {
     isa: Isa,
@@ -140,9 +143,9 @@ impl<R: Real> Work for Signs<'_, R> {
             // One trajectory: the places side by side, all of them, as vector instructions want it.
             let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
             let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
-            // Clear: farther from the level than it moves in the step.
+            // Clear: far from the level for how much it moves in the step.
             let middle = found.lane(MOST_PROBES / 2 - 1) - less;
-            let change = (middle - start.lane(0)).abs() + (end.lane(0) - middle).abs();
+            let change = NEAR * ((middle - start.lane(0)).abs() + (end.lane(0) - middle).abs());
             let (low, high) = (Packet::constant(less - change), Packet::constant(less + change));
             let all_below = side.below.any() && !found.less(low).not().any() && end.less(R::zero()).any();
             let all_above = side.above.any() && !high.less(found).not().any() && R::zero().less(end).any();
