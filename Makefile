@@ -35,7 +35,7 @@ endif
 # What the compiled module is made of; cargo itself decides what to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install edit demo docs test test-rust test-python test-slow lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-crossings bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
+.PHONY: help install edit demo docs test test-rust test-python test-slow fuzz lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-crossings bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -64,6 +64,9 @@ test-python: .venv/.ready-test ## only the tests of the Python package (ARGS="-k
 
 test-slow: .venv/.ready-test ## the tests that `make test` leaves out: what faster ones ask, more precisely
 	$(STEP) "pytest, the slow tests" $(PY) -m pytest -m nightly -n auto --durations=0 $(ARGS)
+
+fuzz: .venv/.ready-test ## hostile inputs for an hour: formulas, tables, files, films, arguments (ARGS="--minutes 5 --kinds csv,files")
+	$(PY) tests/fuzz/campaign.py $(ARGS)
 
 test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" for some of it)
 	$(STEP) "pytest in a browser" env UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)

@@ -1,0 +1,427 @@
+"""Hostile inputs by kind: a case draws an input and lets only results and clear refusals pass."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import linecache
+import os
+import signal
+import tempfile
+import time
+import traceback
+import warnings
+import zipfile
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject
+from scipy.integrate import solve_ivp
+
+import udd
+from udd.video.reader import Film
+
+PACKAGE = str(Path(udd.__file__).parent)
+LONGEST_MESSAGE = 500  # characters
+PATIENCE = 10.0  # seconds before Ctrl-C is pressed
+DEAF = 0.3  # seconds that a run may go on after Ctrl-C; more on a machine that is busy (`UDD_FUZZ_DEAF`)
+
+
+class Fault(AssertionError):
+    """A case that broke a promise of the package."""
+
+
+def is_clear(error: BaseException) -> bool:
+    """Return True if a statement of the package or the core raised an error, with a sentence of its own."""
+    if isinstance(error, udd.UddError):
+        return True
+    if not isinstance(error, ValueError | TypeError | MemoryError | OSError):
+        return False
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    line = linecache.getline(last.filename, last.lineno or 0)
+    is_raised_here = "raise" in line or "_core." in line or "core." in line
+    is_python_call = isinstance(error, TypeError) and "argument" in str(error) and "()" in str(error)
+    return is_python_call or (last.filename.startswith(PACKAGE) and is_raised_here)
+
+
+@contextlib.contextmanager
+def watched() -> Iterator[None]:
+    """Let a case end in a result or a clear refusal, and press Ctrl-C after `PATIENCE`."""
+    pressed: list[float] = []
+
+    def press(*_: object) -> None:
+        pressed.append(time.monotonic())
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, press)
+    signal.setitimer(signal.ITIMER_REAL, PATIENCE)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except KeyboardInterrupt:
+        if not pressed:
+            raise
+    except Exception as error:
+        if not is_clear(error):
+            raise Fault(f"{type(error).__name__}: {error}") from error
+        if len(str(error)) > LONGEST_MESSAGE:
+            raise Fault(f"a message of {len(str(error))} characters: {str(error)[:100]}...") from error
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    if pressed and time.monotonic() - pressed[0] > float(os.environ.get("UDD_FUZZ_DEAF", DEAF)):
+        raise Fault(f"deaf to Ctrl-C for {time.monotonic() - pressed[0]:.1f} s")
+
+
+# --- formulas
+
+NAMES = ["x", "v", "t", "a", "pi"]
+FUNCTIONS = ["sin", "cos", "exp", "ln", "sqrt", "abs", "sign", "tanh", "nosuch"]
+NUMBERS = ["0", "1", "2", "0.5", "1e300", "1e-300", "1e999", "-3", "2.0"]
+
+
+def expressions() -> st.SearchStrategy[str]:
+    """Formulas of names, numbers, functions and operators, most of them well formed."""
+
+    def extended(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
+        return st.one_of(
+            st.tuples(inner, st.sampled_from("+-*/^"), inner).map(lambda p: f"({p[0]} {p[1]} {p[2]})"),
+            st.tuples(st.sampled_from(FUNCTIONS), inner).map(lambda p: f"{p[0]}({p[1]})"),
+            st.tuples(inner, inner, inner).map(lambda p: f"where({p[0]} > 0, {p[1]}, {p[2]})"),
+            st.tuples(st.sampled_from(["min", "max", "atan2"]), inner, inner).map(
+                lambda p: f"{p[0]}({p[1]}, {p[2]})"
+            ),
+        )
+
+    return st.recursive(st.sampled_from(NAMES + NUMBERS), extended, max_leaves=12)
+
+
+def formulas(data: DataObject) -> None:
+    """Build a model of drawn formulas or drawn text and run it."""
+    text = st.text(alphabet="xvta0123456789.+-*/^(),<>&|=! e\n\0é", max_size=40)
+    rates = [data.draw(expressions() | text) for _ in range(2)]
+    method = data.draw(st.sampled_from(["dopri5", "dop853", "taylor", "rodas", "auto"]))
+    start = [data.draw(st.floats(-5, 5)) for _ in range(2)]
+    with watched():
+        model = udd.Model(["x", "v"], rates, {"a": data.draw(st.floats(-3, 3))})
+        run = udd.simulate(
+            model, data.draw(st.sampled_from([0.0, 0.1, 1.0, -1.0, 1e-320])), start, method=method
+        )
+        if run.outcome == "finished" and not np.isfinite(run.state).all():
+            raise Fault(f"a finished run with states that are not finite: {rates}")
+
+
+def differential(data: DataObject) -> None:
+    """Compare all methods with SciPy's DOP853 on a smooth drawn law."""
+    terms = ["x", "v", "sin(x)", "cos(t)", "x*v", "x^2", "v^2", "tanh(v)", "exp(-x^2)", "1"]
+    numbers = st.floats(-2, 2).map(lambda value: round(value, 3))
+    rates = [
+        " + ".join(
+            f"({data.draw(numbers)})*{term}"
+            for term in data.draw(st.lists(st.sampled_from(terms), min_size=1, max_size=4))
+        )
+        for _ in range(2)
+    ]
+    start = [data.draw(st.floats(-2, 2)) for _ in range(2)]
+    model = udd.Model(["x", "v"], rates)
+    t_end = 2.0
+
+    def reference(rtol: float) -> Any:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return solve_ivp(
+                lambda t, x: model.rates(t, x),
+                (0, t_end),
+                start,
+                method="DOP853",
+                rtol=rtol,
+                atol=rtol * 1e-2,
+            )
+
+    coarse, fine = reference(1e-9), reference(1e-12)
+    if not (coarse.success and fine.success) or np.abs(fine.y).max() > 1e6:
+        return
+    allowed = 1e-6 * (1 + np.abs(fine.y[:, -1])) + 1e3 * np.abs(coarse.y[:, -1] - fine.y[:, -1])
+    for method in ("dopri5", "dop853", "taylor", "rodas", "auto"):
+        with watched():
+            run = udd.simulate(model, t_end, start, method=method)
+            if run.outcome == "finished" and (np.abs(run.state[-1] - fine.y[:, -1]) > allowed).any():
+                raise Fault(f"{method} of {rates} from {start}: {run.state[-1]}, SciPy has {fine.y[:, -1]}")
+
+
+# --- arguments of public functions
+
+ODD: list[Any] = [
+    *(None, True, -1, 0, 1, 2.5, 2**31, 2**53 + 1, 10**400, 1e308, 5e-324, float("nan"), float("inf"), 1j),
+    *(
+        "",
+        "x",
+        "nosuch",
+        "a" * 5000,
+        b"x",
+        "\0",
+        [],
+        [[]],
+        [1],
+        [1, "x"],
+        [None],
+        [[1], [1, 2]],
+        (),
+        {},
+        {"x": 1},
+    ),
+    *(set(), object(), lambda: 0, np.zeros(0), np.zeros((2, 0, 3)), np.array(["a"]), np.array([None])),
+    *(
+        np.full(3, np.nan),
+        np.datetime64("2026-01-01"),
+        Path("nosuch/file"),
+        Exception("x"),
+        range(3),
+        slice(None),
+    ),
+]
+
+
+@cache
+def calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+    """Return a quick valid call of each public function: the function and its arguments."""
+    dle, disk, start = udd.DLE(1.0), udd.Disk(0.04), [0.0, 1e-3, 0.04, 0.0]
+    run = udd.simulate(disk, np.linspace(0, 1, 30), start)
+    swing = udd.simulate(udd.Pendulum(0.5, k0=0.01), np.linspace(0, 4, 121), [0.0, 0.5])
+    rng = np.random.default_rng(1)
+    record = udd.Measurement(
+        swing.t, {"theta": swing.state[:, 1] + 1e-3 * rng.normal(size=121)}, 1e-3 * np.ones((121, 1))
+    )
+    fit = udd.fit(record, udd.Pendulum(0.5))
+    damped = udd.DLE(2.5, B=0.2)
+    rest = udd.equilibria(damped, initial_states=8)[0]
+    branch = udd.continuation(rest, "w", (1.0, 9.0), max_points=30)
+    lorenz = [1.0, 1.0, 0.1]
+    cycle = udd.periodic_orbit(udd.DLE(10.0), settle=50.0)
+    return {
+        "simulate": (udd.simulate, {"model": dle, "t": 1.0, "state0": lorenz}),
+        "ensemble": (udd.ensemble, {"model": dle, "t": 1.0, "state0": lorenz, "threads": 1}),
+        "lyapunov": (udd.lyapunov, {"w": 1.0, "t": 20.0, "transient": 1.0, "state0": lorenz, "threads": 1}),
+        "lyapunov_spectrum": (
+            udd.lyapunov_spectrum,
+            {"w": 1.0, "t": 20.0, "transient": 1.0, "state0": lorenz},
+        ),
+        "covariant_vectors": (udd.covariant_vectors, {"model": dle, "n": 5, "dt": 0.1, "transient": 1.0}),
+        "poincare": (udd.poincare, {"model": dle, "section": "z", "n": 3, "transient": 1, "state0": lorenz}),
+        "bifurcation": (
+            udd.bifurcation,
+            {"model": dle, "parameter": "w", "values": [1.0], "n": 5, "transient": 5, "attractors": False},
+        ),
+        "basins": (udd.basins, {"model": udd.DLE(4.5), "grid": {"y": [0.1]}, "n": 12, "transient": 5}),
+        "equilibria": (udd.equilibria, {"model": damped, "initial_states": 4}),
+        "continuation": (
+            udd.continuation,
+            {"start": rest, "parameter": "w", "bounds": (1.0, 9.0), "ds": 0.05, "max_points": 5},
+        ),
+        "periodic_orbit": (udd.periodic_orbit, {"model": udd.DLE(10.0), "settle": 20.0}),
+        "locus": (udd.locus, {"point": branch.points[0], "parameter": "B", "max_points": 3})
+        if branch.points
+        else (print, {}),
+        "lifetimes": (
+            udd.lifetimes,
+            {"model": udd.DLE(10.0), "starts": [lorenz], "attractors": cycle, "t_max": 5.0},
+        ),
+        "energy_balance": (udd.energy_balance, {"run": run}),
+        "Measurement": (udd.Measurement, {"t": [0, 1, 2.0], "values": {"theta": [0, 0.1, 0.2]}}),
+        "Measurement.slice": (lambda **given: record.slice(**given), {"t0": 0.0, "t1": 1.0}),
+        "InputSignal": (udd.InputSignal, {"t": [0, 1, 2.0], "values": [0, 1, 2.0]}),
+        "DLE": (udd.DLE, {"w": 1.0, "B": 0.1}),
+        "Disk": (udd.Disk, {"W": 0.04, "R": 0.08, "k0": 0.012, "effects": ()}),
+        "Pendulum": (udd.Pendulum, {"length": 0.5, "inertia": 0.25, "k0": 0.01}),
+        "Model": (udd.Model, {"states": ["x"], "equations": ["-k*x"], "parameters": {"k": 1.0}}),
+        "with_parameters": (lambda **given: disk.with_parameters(**given), {"values": {"W": 0.05}}),
+        "rates": (lambda **given: dle.rates(**given), {"t": 0.0, "state": lorenz}),
+        "pendulum_chain": (
+            udd.pendulum_chain,
+            {"masses": [1.0], "lengths": [0.3], "centres": [0.15], "inertias": [0.01], "friction": [0.0]},
+        ),
+        "mechanism": (
+            udd.mechanism,
+            {"coordinates": {"q": "v"}, "mass": [["1"]], "forces": ["-k*q"], "parameters": {"k": 1.0}},
+        ),
+        "moved_pendulum": (udd.moved_pendulum, {"length": 0.5, "inertia": 0.3}),
+        "driven_disk": (udd.driven_disk, {"R": 0.06, "k0": 0.01}),
+        "smooth": (udd.smooth, {"measurement": record, "gap": 0.1}),
+        "fit": (udd.fit, {"measurement": record, "model": udd.Pendulum(0.5), "free": ["k0"]}),
+        "forecast": (udd.forecast, {"measurement": record, "model": fit, "members": 4}),
+        "input_bias": (udd.input_bias, {"fit": fit, "draws": 2}),
+        "Defects": (udd.film.Defects, {}),
+        "SweepSpec": (
+            udd.SweepSpec,
+            {"quantity": "lyapunov", "model": dle, "over": {"w": [1.0]}, "options": {"t": 5.0}},
+        ),
+        "read_measurement": (udd.read_measurement, {"path": "nosuch.csv"}),
+        "load": (udd.load, {"path": "nosuch.udd"}),
+        "save": (udd.save, {"result": fit, "path": os.devnull + "/x"}),
+    }
+
+
+# These take long with valid arguments, too: they are called with one argument that is wrong.
+ODD_ONLY = {
+    "discover": "measurement",
+    "prune": "measurement",
+    "track": "video",
+    "render": "trajectory",
+    "sweep": "spec",
+}
+
+
+def arguments(data: DataObject) -> None:
+    """Call a public function with one or two arguments that are odd."""
+    name = data.draw(st.sampled_from([*calls(), *ODD_ONLY]))
+    if name in ODD_ONLY:
+        with watched():
+            getattr(udd, name)(
+                data.draw(st.sampled_from(ODD)), *([None] if name in ("discover", "prune", "render") else [])
+            )
+        return
+    function, given = calls()[name]
+    changed = dict(given)
+    for key in data.draw(st.lists(st.sampled_from([*given, "nosuch"]), min_size=1, max_size=2, unique=True)):
+        changed[key] = data.draw(st.sampled_from(ODD))
+    with watched(), contextlib.redirect_stdout(io.StringIO()):
+        function(**changed)
+
+
+# --- tables and files
+
+
+def bent(sample: bytes, data: DataObject) -> bytes:
+    """Return a sample with some of its bytes replaced, removed, repeated or cut off."""
+    changed = bytearray(sample)
+    for _ in range(data.draw(st.integers(1, 6))):
+        if not changed:
+            break
+        at = data.draw(st.integers(0, len(changed) - 1))
+        what = data.draw(st.sampled_from(["replace", "remove", "repeat", "cut", "insert"]))
+        if what == "replace":
+            changed[at] = data.draw(st.integers(0, 255))
+        elif what == "remove":
+            del changed[at : at + data.draw(st.integers(1, 40))]
+        elif what == "repeat":
+            changed[at:at] = changed[at : at + data.draw(st.integers(1, 60))] * data.draw(st.integers(1, 20))
+        elif what == "cut":
+            del changed[at:]
+        else:
+            changed[at:at] = data.draw(st.binary(max_size=12))
+    return bytes(changed)
+
+
+TABLE = "# R = 0.08\n# W = 0.039\nt,theta,sigma_theta\n" + "\n".join(
+    f"{k / 30},{0.1 * k % 3},0.001" for k in range(20)
+)
+TABLES = [
+    TABLE,
+    TABLE.replace(",", ";").replace(".", ","),
+    TABLE.replace(",", "\t"),
+    '"Zeit / s";"Winkel / rad"\n'
+    + "\n".join(f"{k / 20:.3f};{0.1 * k:.3f}".replace(".", ",") for k in range(20)),
+]
+
+
+def read(content: bytes, name: str) -> None:
+    """Read a measurement from a file of this content."""
+    with tempfile.TemporaryDirectory() as folder, watched():
+        path = Path(folder) / name
+        path.write_bytes(content)
+        udd.read_measurement(path)
+
+
+def csv(data: DataObject) -> None:
+    """Read a table whose text was bent."""
+    read(bent(data.draw(st.sampled_from(TABLES)).encode(), data), "table.csv")
+
+
+@cache
+def samples() -> dict[str, bytes]:
+    """Return a small valid file of each compiled format."""
+    t = np.linspace(0, 2, 60)
+    record = udd.Measurement(t, {"theta": 0.2 * np.exp(-0.1 * t) * np.sin(t)})
+    fit = udd.fit(record, udd.Pendulum(9.81))
+    made: dict[str, bytes] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        writers: dict[str, Callable[[Path], object]] = {
+            "a.udd": lambda path: udd.save(fit, path),
+            "a.parquet": record.to_parquet,
+            "a.h5": lambda path: _to_hdf5(path, t),
+            "a.mat": lambda path: _to_mat(path, t),
+        }
+        for name, write in writers.items():
+            with contextlib.suppress(ImportError):
+                write(Path(folder) / name)
+                made[name] = (Path(folder) / name).read_bytes()
+    zipped = io.BytesIO()
+    with zipfile.ZipFile(zipped, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("Gyroscope.csv", TABLE)
+    made["a.zip"] = zipped.getvalue()
+    return made
+
+
+def _to_hdf5(path: Path, t: Any) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["t"], file["theta"] = t, np.sin(t)
+
+
+def _to_mat(path: Path, t: Any) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"t": t, "theta": np.sin(t)})
+
+
+def files(data: DataObject) -> None:
+    """Read a file of a compiled format whose bytes were bent."""
+    name = data.draw(st.sampled_from(sorted(samples())))
+    content = bent(samples()[name], data)
+    if name.endswith(".udd"):
+        with tempfile.TemporaryDirectory() as folder, watched():
+            path = Path(folder) / name
+            path.write_bytes(content)
+            udd.load(path)
+    else:
+        read(content, name)
+
+
+def films(data: DataObject) -> None:
+    """Read the frames of a film whose bytes were bent, through the decoder's process."""
+    sample = (Path(udd.__file__).parent / "demo" / "sample.mp4").read_bytes()
+    with tempfile.TemporaryDirectory() as folder, watched():
+        path = Path(folder) / "film.mp4"
+        path.write_bytes(bent(sample, data))
+        pictures = Film(path).pictures()
+        with contextlib.closing(pictures):  # type: ignore[type-var]
+            for _ in zip(range(5), pictures, strict=False):
+                pass
+
+
+def specifications(data: DataObject) -> None:
+    """Read a sweep's specification whose TOML or JSON text was bent."""
+    toml = (
+        'quantity = "lyapunov"\nchunk = 4\n[model]\nkind = "dle"\nw = 1.0\n'
+        "[over.w]\nfrom = 0.5\nto = 2.0\nn = 4\n[options]\ntol = 0.02\n"
+    )
+    json = (
+        '{"quantity": "final_state", "model": {"kind": "dle", "w": 1.0}, '
+        '"over": {"w": [1, 2]}, "options": {"t": 5}}'
+    )
+    name, sample = data.draw(st.sampled_from([("a.toml", toml), ("a.json", json)]))
+    with tempfile.TemporaryDirectory() as folder, watched():
+        path = Path(folder) / name
+        path.write_bytes(bent(sample.encode(), data))
+        udd.SweepSpec.read(path)
+
+
+KINDS: dict[str, Callable[[DataObject], None]] = {
+    kind.__name__: kind for kind in (formulas, differential, arguments, csv, files, films, specifications)
+}
