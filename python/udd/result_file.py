@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.atomic_files import write_whole
 from udd._util.input_files import LARGEST, NESTED, MemoryLimit, read_regular
 from udd._util.numpy_files import arrays_of
@@ -92,6 +93,7 @@ _BROKEN = (
 )
 
 
+@checked_arguments
 def save(result: Fit | Discovery, path: str | os.PathLike[str]) -> None:
     """Write a fit or a discovery to a file that :func:`udd.load` reads.
 
@@ -131,6 +133,7 @@ def save(result: Fit | Discovery, path: str | os.PathLike[str]) -> None:
     write_whole(path, content.getvalue())
 
 
+@checked_arguments
 def load(path: str | os.PathLike[str], *, limit: float = LARGEST) -> Fit | Discovery:
     """Read a fit or a discovery that :func:`udd.save` wrote; nothing in the file is run.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.memory import require_memory
@@ -46,6 +47,7 @@ _FINAL = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
 
 
 @renamed(extend="max_extension")
+@checked_arguments
 def basins(
     model: Model,
     grid: Mapping[str, ArrayLike],

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.memory import require_memory
@@ -54,6 +55,7 @@ _OPTIONS: DiagramOptions = {**RUN_OPTIONS, "max_extension": 64, "perturbation": 
 
 
 @renamed(starts="initial_states", extend="max_extension", nudge="perturbation", reach="match_distance")
+@checked_arguments
 def bifurcation(
     model: Model,
     parameter: str,

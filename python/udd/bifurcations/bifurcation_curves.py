@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
@@ -71,6 +72,7 @@ class Locus:
 
 
 @renamed(step="ds", longest="ds_max", most="max_points")
+@checked_arguments
 def locus(
     point: BifurcationPoint,
     parameter: str,

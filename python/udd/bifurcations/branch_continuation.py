@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import ModelError
@@ -30,6 +31,7 @@ __all__ = ["bounds_of", "branch_from", "continuation"]
 
 
 @renamed(step="ds", longest="ds_max", most="max_points", period="max_period")
+@checked_arguments
 def continuation(
     start: Equilibrium | PeriodicOrbit | BifurcationPoint,
     parameter: str | None = None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd.attractors.arguments import parameter_values
 from udd.attractors.bifurcation_diagram import bifurcation
@@ -78,6 +79,7 @@ class Diagram:
 
 
 @renamed(most="max_points", period="max_period")
+@checked_arguments
 def diagram(
     model: Model,
     parameter: str,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import linalg
 
+from udd._util.arguments import checked_arguments
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch
@@ -102,6 +103,7 @@ class Connection:
         )
 
 
+@checked_arguments
 def connection(branch: Branch) -> Connection:
     """The homoclinic or heteroclinic orbit to which a branch of cycles tends.
 

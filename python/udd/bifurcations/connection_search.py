@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.memory import require_memory
 from udd._util.validation import number, whole
@@ -83,6 +84,7 @@ class Connections(FoundList[Connection]):
 
 
 @renamed(longest="t_max")
+@checked_arguments
 def connections(
     model: Model,
     parameter: str,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from udd._util.arguments import checked_arguments
 from udd._util.memory import require_memory
 from udd._util.validation import whole
 from udd.errors import IncompleteWarning, IntegrationError, ModelError
@@ -99,6 +100,7 @@ class Crisis:
         )
 
 
+@checked_arguments
 def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     """Where chaotic attractors meet the saddle cycles of a branch: boundary, interior and merging crises.
 

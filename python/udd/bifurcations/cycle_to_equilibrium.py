@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
+from udd._util.arguments import checked_arguments
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch, cycles_of
@@ -67,6 +68,7 @@ class CycleConnection:
         )
 
 
+@checked_arguments
 def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleConnection]:
     """Where an equilibrium and the cycles of a branch are connected.
 

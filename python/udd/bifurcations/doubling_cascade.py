@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import whole
 from udd.errors import IntegrationError, ModelError
 
@@ -89,6 +90,7 @@ def _aitken(values: Floats) -> float:
     return float(c - (c - b) ** 2 / ((c - b) - (b - a)))
 
 
+@checked_arguments
 def cascade(
     start: PeriodicOrbit | BifurcationPoint,
     parameter: str | None = None,

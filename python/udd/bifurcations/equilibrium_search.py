@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy import optimize
 from scipy.stats import qmc
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.memory import require_memory
 from udd._util.validation import array, whole
@@ -34,6 +35,7 @@ class Equilibria(FoundList[Equilibrium]):
 
 
 @renamed(starts="initial_states")
+@checked_arguments
 def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: int = 128) -> Equilibria:
     """The equilibria of a model.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.validation import array, number
 from udd.errors import IntegrationError, ModelError
@@ -44,6 +45,7 @@ _RESIDUAL = 1e-9  # gaps that are as good as none
 
 
 @renamed(longest="max_period")
+@checked_arguments
 def periodic_orbit(
     model: Model,
     guess: ArrayLike | xr.Dataset | None = None,

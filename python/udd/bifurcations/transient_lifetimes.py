@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.validation import array, number
 from udd.errors import ModelError
@@ -69,6 +70,7 @@ class Lifetimes:
 
 
 @renamed(longest="t_max")
+@checked_arguments
 def lifetimes(
     model: Model,
     starts: ArrayLike,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.progress import progress_bar, thread_count
 from udd._util.validation import number
 from udd.errors import ConvergenceWarning, IntegrationError, ModelError
@@ -69,6 +70,7 @@ def lyapunov(
 ) -> Any: ...
 
 
+@checked_arguments
 def lyapunov(
     w: ArrayLike | Model,
     *,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import with_defaults
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
@@ -222,6 +223,7 @@ class Section:
         )
 
 
+@checked_arguments
 def poincare(
     model: Model,
     section: str | Sequence[str] | None = None,

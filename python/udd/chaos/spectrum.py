@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.memory import require_memory
 from udd._util.validation import number, whole
 from udd.errors import ConvergenceWarning, IntegrationError
@@ -103,6 +104,7 @@ class Spectrum:
         )
 
 
+@checked_arguments
 def lyapunov_spectrum(
     w: float | Model,
     *,
@@ -410,6 +412,7 @@ class Covariant:
         return angles
 
 
+@checked_arguments
 def covariant_vectors(
     model: Model,
     n: int = 1000,

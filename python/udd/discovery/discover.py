@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from udd._util import background_import
+from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
@@ -52,6 +53,7 @@ TRAIN = 0.6
 _SHORTEST = 20  # frames: of fewer the first part determines no model and the rest tests none
 
 
+@checked_arguments(error=FitError)
 def discover(
     measurement: Measurement | Sequence[Measurement],
     model: Model | Sequence[Model],

@@ -11,6 +11,7 @@ import numpy as np
 
 from udd import _core
 from udd._util import chi_squared
+from udd._util.arguments import checked_arguments
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, continuous, fit_record, record_of
 from udd.fitting.estimator_input import FilmParameters
@@ -78,6 +79,7 @@ class Pruned:
         }
 
 
+@checked_arguments(error=FitError)
 def prune(
     measurement: Measurement | Sequence[Measurement],
     model: Model | Sequence[Model],

@@ -12,6 +12,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed, with_defaults
 from udd._util.memory import require_memory
 from udd._util.random_generator import Rng, generator
@@ -72,6 +73,7 @@ class Film:
 
 
 @renamed(seed="rng")
+@checked_arguments
 def render(
     trajectory: TrajectoryLike,
     path: str | os.PathLike[str],

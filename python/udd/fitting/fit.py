@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.effects import Effect
 from udd.errors import FitError, outside
 from udd.measurement import Measurement
@@ -44,6 +45,7 @@ _BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is l
 Misfits = Literal["noise", "little", "faults"]
 
 
+@checked_arguments(error=FitError)
 def fit(
     measurement: Measurement | Sequence[Measurement],
     model: Model | Sequence[Model],

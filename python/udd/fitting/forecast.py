@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._util.angles import wrapped
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.memory import require_memory
 from udd._util.progress import thread_count
@@ -141,6 +142,7 @@ class Forecast:
 
 
 @renamed(seed="rng")
+@checked_arguments(error=FitError)
 def forecast(
     measurement: Measurement,
     model: Model | Fit,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import whole
 from udd.errors import FitError
 from udd.measurement import InputSignal, Measurement
@@ -44,6 +45,7 @@ class InputBias:
     corrected: dict[str, float]
 
 
+@checked_arguments(error=FitError)
 def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None = 0) -> InputBias:
     """Simulation extrapolation (SIMEX): what the inputs' noise does to the fitted numbers.
 

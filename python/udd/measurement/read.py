@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.input_files import LARGEST, MemoryLimit, read_regular
 from udd.errors import MeasurementError
 
@@ -25,6 +26,7 @@ from .unwrapping import unwrapped
 Columns = str | Sequence[str] | Mapping[str, str | tuple[str, str]]
 
 
+@checked_arguments(error=MeasurementError)
 def read_measurement(
     path: str | os.PathLike[str],
     columns: Columns | None = None,

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import number
 
 from . import DISK, Measurement, MeasurementError, check_length
@@ -32,6 +33,7 @@ class _Stretch:
     noise: Array  # (n, m, m)
 
 
+@checked_arguments(error=MeasurementError)
 def smooth(
     measurement: Measurement, *, gap: float = 0.1, slip: float | None = None, angles: Collection[str] = ()
 ) -> Measurement:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.labelled import dataset
 from udd.errors import MeasurementError
 
@@ -90,6 +91,7 @@ class Measurement:
     quality: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     inputs: Mapping[str, InputSignal] = field(default_factory=dict)
 
+    @checked_arguments(error=MeasurementError)
     def __init__(
         self,
         t: ArrayLike,
@@ -210,6 +212,7 @@ class Measurement:
                 correlation[:, a, b] = correlation[:, b, a] = self.rho[:, k]
         return np.asarray(self.sigma[:, :, None] * correlation * self.sigma[:, None, :])
 
+    @checked_arguments(error=MeasurementError)
     def slice(self, t0: float, t1: float) -> Measurement:
         """Rows with ``t0 <= t < t1`` [s]; the times keep their origin, and inputs are whole."""
         return self.rows((self.t >= t0) & (self.t < t1))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed_attribute
 from udd._util.validation import array, number
 from udd.effects import Effect
@@ -171,6 +172,7 @@ class Model:
         effects = [(e.name, e.momentum, e.treatment, e.spec.own) for e in self.effects]
         return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
 
+    @checked_arguments
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """The model with other values of some parameters.
 

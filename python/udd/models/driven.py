@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import number
 
 from .formula_model import FormulaModel
@@ -9,6 +10,7 @@ from .formula_model import FormulaModel
 __all__ = ["driven_disk", "moved_pendulum"]
 
 
+@checked_arguments
 def driven_disk(
     R: float = 0.06, *, k0: float = 0.0, k1: float = 0.0, k2: float = 0.0, g: float = 9.81
 ) -> FormulaModel:
@@ -63,6 +65,7 @@ def driven_disk(
     )
 
 
+@checked_arguments
 def moved_pendulum(
     length: float, *, inertia: float | None = None, k0: float = 0.0, g: float = 9.81
 ) -> FormulaModel:

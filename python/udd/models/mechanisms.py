@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression, text_of
 from udd.errors import ModelError
 
@@ -14,6 +15,7 @@ __all__ = ["mechanism", "pendulum_chain"]
 _MOST_LINKS = 3  # six states
 
 
+@checked_arguments
 def mechanism(
     coordinates: Mapping[str, str],
     mass: Sequence[Sequence[Expression]],
@@ -90,6 +92,7 @@ def mechanism(
     )
 
 
+@checked_arguments
 def pendulum_chain(
     masses: Sequence[float],
     lengths: Sequence[float],

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.errors import ModelError
 from udd.models import Disk
 
@@ -53,6 +54,7 @@ class EnergyBalance:
         return np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(self.t)))
 
 
+@checked_arguments
 def energy_balance(run: Trajectory) -> EnergyBalance:
     """Motor power against friction power along a run.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
 from udd.errors import ModelError, interrupted
@@ -82,6 +83,7 @@ class Ensemble:
         return f"<Ensemble of {self.model!r}: runs {self.outcome.shape}, {len(self.t)} times>"
 
 
+@checked_arguments
 def ensemble(
     model: Model,
     t: ArrayLike,

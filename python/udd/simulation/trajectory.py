@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.labelled import of_states
 from udd._util.validation import array, number
 from udd.errors import IncompleteWarning, ModelError
@@ -251,6 +252,7 @@ def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
     return state
 
 
+@checked_arguments
 def simulate(
     model: Model,
     t: ArrayLike,

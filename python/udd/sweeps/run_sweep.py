@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd.errors import IncompleteWarning, ModelError, interrupted
 
 from .chunks import grid_of
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     import zarr
 
 
+@checked_arguments
 def sweep(
     spec: SweepSpec,
     executor: Executor | None = None,

@@ -11,6 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.calibration_items import Calibrate
 from udd.errors import outside
 from udd.markers.layout import Layout
@@ -60,6 +61,7 @@ class Tracking:
     outline: Rim | None
 
 
+@checked_arguments
 def track(
     video: str | os.PathLike[str],
     *,

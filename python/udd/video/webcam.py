@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import number
 
 from .reader import TrackError
@@ -83,6 +84,7 @@ class Recording:
         return f"{what}; {self.lost} lost ({share:.1f} %) in {gaps}, the longest of {longest:.0f} ms"
 
 
+@checked_arguments
 def record(
     path: str | os.PathLike[str], *, camera: int | Source = 0, seconds: float = 20.0, progress: bool = False
 ) -> Recording:
