@@ -112,6 +112,8 @@ def other_unit(
     """
     short = [m.rows(np.arange(min(_FRAMES, len(m)))) for m in measurements]
     record = record_of(short, models)
+    if record.states.shape[1] != len(models[0].state_names):
+        return None  # Fits refuse friction with bristles, whose state no record has.
     last = record.part(~record.first(_FIRST))
     margin = _CLEARLY * np.array([record.observed.sum(), last.observed.sum()])
 

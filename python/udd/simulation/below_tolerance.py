@@ -130,7 +130,7 @@ def _states(model: Model, times: _Floats, start: _Floats, rtol: float, atol: flo
     method = "taylor" if _core.has_series(model) else "dop853"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StiffnessWarning)
-        return _core.simulate(model, times, math.nan, start.tolist(), rtol, atol, method, False)
+        return _core.simulate(model, times, math.nan, start.tolist(), rtol, atol, math.inf, method, False)
 
 
 def _matters(model: Model, k: int, times: _Floats, state: _Floats, rtol: float, atol: float) -> bool:
