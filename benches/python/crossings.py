@@ -64,6 +64,11 @@ def roots(f: Callable[[Floats], Floats], length: float, fastest: float) -> Float
         knots.append(t[i])
     at = np.unique([*knots, t[-1]])
     values = f(at)
+    # A zero at a place of the grid is one between its neighbours; of one at the start the side after it counts.
+    at, values = at[values != 0], values[values != 0]
+    if at[0] > 0:
+        near = np.geomspace(1e-9 * at[0], at[0], 200)[:-1]
+        at, values = np.concatenate([near, at]), np.concatenate([f(near), values])
     found = [
         brentq(lambda s: float(f(np.asarray(s))), a, b, xtol=1e-14)
         for a, b, fa, fb in zip(at[:-1], at[1:], values[:-1], values[1:], strict=True)

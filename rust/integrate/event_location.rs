@@ -33,6 +33,8 @@ const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 const NOISE: f64 = 1e-14;
+/// A function has no zero between two places if its bend, times this, is less than the sum of the two values.
+const CLEAR_SUM: f64 = 4.0;
 /// A function has no zero in a step if its bend between quarters, times this, is less than its values near both ends.
 const CLEAR: f64 = 1.5;
 /// A step with more pieces to look at is cut where they end.
@@ -208,10 +210,21 @@ where
             values[i] = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
             beyond = beyond.or(values[i].less(S::Real::zero()));
         }
-        // Quarters of the step will do. A function that is farther from zero than it changes near both ends has no dip.
-        let stride = places / 4;
-        let (a, b, c, d) =
-            (values[stride - 1], values[2 * stride - 1], values[3 * stride - 1], values[4 * stride - 1]);
+        if places == MOST_PROBES {
+            // A long step: quarters alone hide zeros of a series that ends. At the start is the straight line through the
+            // next two places.
+            let mut least = values[0].scale(3.0) - values[1];
+            let mut bend = S::Real::zero();
+            for i in 1..MOST_PROBES {
+                least = least.min(values[i - 1] + values[i]);
+                if i % 2 == 0 {
+                    bend = bend.max((values[i] - values[i - 1].scale(2.0) + values[i - 2]).abs());
+                }
+            }
+            return beyond.or(bend.scale(CLEAR_SUM).less(least).not());
+        }
+        // A function that is farther from zero than it changes near both ends has no dip.
+        let (a, b, c, d) = (values[0], values[1], values[2], values[3]);
         let least = a.min(d);
         let mut doubt = ((a - b).abs() + (c - d).abs()).less(least).not();
         if doubt.any() {

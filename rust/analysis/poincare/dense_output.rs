@@ -1,13 +1,10 @@
 //! The polynomials of a step, looked at with the best instructions that there are.
 
-use crate::analysis::poincare::sign_changes::{Side, Stretch, in_doubt, judge};
+use crate::analysis::poincare::sign_changes::{CLEAR, Side, Stretch, in_doubt, judge};
 use crate::integrate::{MOST_PROBES, Method};
 use crate::model::choose;
 use crate::scalar::{InstructionSet, Isa, Mask, Packet, Real, Scalar, Work};
 use crate::unroll::vector;
-
-/// A component is clear of a level that is farther away than this part of its change in a step.
-const NEAR: f64 = 0.125;
 
 /// The polynomials of a step, one for each component of the state, in their own unit of time.
 pub struct DenseOutput<'a, R: Real, const D: usize> {
@@ -143,9 +140,10 @@ impl<R: Real> Work for Signs<'_, R> {
             // One trajectory: the places side by side, all of them, as vector instructions want it.
             let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
             let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
-            // Clear: far from the level for how much it moves in the step.
-            let middle = found.lane(MOST_PROBES / 2 - 1) - less;
-            let change = NEAR * ((middle - start.lane(0)).abs() + (end.lane(0) - middle).abs());
+            // As in `in_doubt`: each value is then large enough for half of the sum with its neighbour.
+            let at = |i: usize| if i == 0 { start.lane(0) + less } else { found.lane(i - 1) };
+            let bend = |i: usize| (at(i - 1) - 2.0 * at(i) + at(i + 1)).abs();
+            let change = 0.5 * CLEAR * bend(1).max(bend(3)).max(bend(5).max(bend(7)));
             let (low, high) = (Packet::constant(less - change), Packet::constant(less + change));
             let all_below = side.below.any() && !found.less(low).not().any() && end.less(R::zero()).any();
             let all_above = side.above.any() && !high.less(found).not().any() && R::zero().less(end).any();

@@ -1,9 +1,10 @@
 //! On which side of a surface lanes are, and where they change it.
 
+use crate::integrate::MOST_PROBES;
 use crate::scalar::{Mask, Real};
 
 /// Nothing is hidden between two places if the bend of the values, times this, is less than the sum of the two sizes.
-const CLEAR: f64 = 2.0;
+pub const CLEAR: f64 = 4.0;
 
 /// On which side of a surface the lanes are, in which direction crossing it counts, and in which lanes.
 #[derive(Clone, Copy, Debug)]
@@ -52,13 +53,17 @@ pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Str
 /// much for their distance from zero and from one another.
 #[inline(always)]
 pub fn in_doubt<R: Real>(start: R, values: &[R]) -> R::Mask {
-    // Quarters of the step will do. Written out: closures are not compiled for the lanes' instructions.
-    let stride = values.len() / 4;
-    let (a, b, c, d) =
-        (values[stride - 1], values[2 * stride - 1], values[3 * stride - 1], values[4 * stride - 1]);
-    let bend = (start - a.scale(2.0) + b).abs().max((b - c.scale(2.0) + d).abs());
-    let (first, a, b, c, d) = (start.abs(), a.abs(), b.abs(), c.abs(), d.abs());
-    let least = (first + a).min(a + b).min(b + c).min(c + d);
+    let (mut least, mut bend) = (R::constant(f64::INFINITY), R::zero());
+    let (mut last, mut before, mut size) = (start, start, start.abs());
+    for i in 0..values.len() {
+        let (value, next) = (values[i], values[i].abs());
+        least = least.min(size + next);
+        // Every other one will do where there are many; quarters alone hide zeros of a series that ends.
+        if i % 2 == 1 || values.len() < MOST_PROBES && i > 0 {
+            bend = bend.max((value - last.scale(2.0) + before).abs());
+        }
+        (before, last, size) = (last, value, next);
+    }
     bend.scale(CLEAR).less(least).not()
 }
 
