@@ -284,10 +284,13 @@ impl Mask for Truth {
 mod tests {
     use super::*;
 
+    /// A function of intervals, and the same function of numbers.
+    type Pair = (fn(Interval) -> Interval, fn(f64) -> f64);
+
     /// Every function's interval contains its values at 200 places within.
     #[test]
     fn functions_contain_their_values() {
-        let functions: [(fn(Interval) -> Interval, fn(f64) -> f64); 9] = [
+        let functions: [Pair; 9] = [
             (Scalar::sin, f64::sin),
             (Scalar::cos, f64::cos),
             (Scalar::tanh, f64::tanh),

@@ -59,6 +59,23 @@ def test_every_zero_of_a_cubic_within_one_step_is_seen() -> None:
     assert found == pytest.approx([2, 6, 10], abs=1e-8)
 
 
+@pytest.mark.parametrize(
+    "zeros",
+    [
+        [0.52886551, 0.57460867, 11.28904342, 11.7203895],
+        [1.46005759, 1.4622204, 2.71011841, 7.81485932, 9.76817696],
+        [0.82110098, 2.10879445, 2.32442197, 7.49774936, 9.32671081],
+    ],
+)
+def test_zeros_that_lie_close_within_a_long_step_are_seen(zeros: list[float]) -> None:
+    curve = np.polynomial.Polynomial.fromroots(zeros)
+    law = " + ".join(f"({c!r})*t^{k}" for k, c in enumerate(curve.deriv().coef.tolist()))
+    model, start = udd.Model(["y"], [law]), [float(curve(0.0))]
+    more = {"rtol": 1e-12, "atol": 1e-14, "t_max": zeros[-1] + 1e-3}
+    found = crossed(model, "y", len(zeros), start, direction="both", **more)
+    assert found == pytest.approx(zeros, abs=1e-6)
+
+
 @pytest.mark.parametrize("near", [0.998, 0.99999, 1 - 1e-8])
 def test_a_section_near_a_crest_is_crossed_twice_at_each(near: float) -> None:
     model = udd.Model(["x", "v"], ["v", "-x"])

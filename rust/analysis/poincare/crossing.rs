@@ -350,7 +350,7 @@ impl<R: Real> Surface<'_, R> {
             let (below, above) = (before.below.lane(lane), before.above.lane(lane));
             let known = (below || above).then_some((0.0, values[0], below));
             let wanted = count.saturating_add(skip.lane(lane) as usize);
-            let patient = |pieces: usize| pieces % 4096 != 0 || !stopped();
+            let patient = |pieces: usize| !pieces.is_multiple_of(4096) || !stopped();
             let mut found = Vec::new();
             sign_changes(&mut curve, known, (values[0], values[last + 1]), &patient, &mut |bracket| {
                 let falls = bracket.high.1 < 0.0;

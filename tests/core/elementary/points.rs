@@ -297,9 +297,12 @@ pub const TANH: [(f64, f64, f64); 52] = [
     (-4.757554875476108, -0.9998525521932008, 3.3620506474002483e-17),
 ];
 
+/// An angle, and its sine and cosine, each as a sum of two numbers.
+type FarAngle = (f64, (f64, f64), (f64, f64));
+
 /// Angles so large that hardly a digit of theirs counts, from the ones closest to multiples of a right angle on: their
 /// sines and cosines, made with whole numbers of 4000 bits.
-pub const FAR: [(f64, (f64, f64), (f64, f64)); 47] = [
+pub const FAR: [FarAngle; 47] = [
     (5.319372648326541e+255, (1.0, -1.098476220074687e-37), (-4.687165924254628e-19, 4.3720557429382733e-36)),
     (1.0638745296653083e+256, (-9.374331848509255e-19, 8.744111485876547e-36), (-1.0, 4.393904880298748e-37)),
     (14461176.67027838, (-1.0, 1.4424576300901068e-36), (-1.6985038298986004e-18, 3.029174338658756e-36)),
