@@ -12,6 +12,10 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 const NOISE: f64 = 4.0;
 /// After each so many halvings a piece is checked for being noise.
 const SHALLOW: u32 = 4;
+/// No piece is halved more often.
+const DEEPEST: u32 = 60;
+/// The most terms of a step's polynomials.
+const MOST_TERMS: usize = 32;
 /// Nothing is hidden between two places if the bend of the values, times these, is less than their distance from zero, or
 /// from one another.
 const DIP: f64 = 1.0;
@@ -54,9 +58,10 @@ pub fn sign_changes(
     let mut known = before;
     let (mut a, mut fa) = (0.0, first);
     // The ends of the pieces to come, the next one last.
-    let mut ends = vec![(1.0, last, 0_u32)];
+    let (mut ends, mut open) = ([(1.0, last, 0_u32); DEEPEST as usize + 2], 1);
     let mut pieces = 0;
-    while let Some(&(b, fb, depth)) = ends.last() {
+    while open > 0 {
+        let (b, fb, depth) = ends[open - 1];
         pieces += 1;
         if !patient(pieces) {
             return a;
@@ -64,13 +69,12 @@ pub fn sign_changes(
         let m = 0.5 * (a + b);
         let fm = curve.value(m);
         if !is_settled(curve, (a, fa), (m, fm), (b, fb), depth) {
-            if let Some(end) = ends.last_mut() {
-                end.2 = depth + 1;
-            }
-            ends.push((m, fm, depth + 1));
+            ends[open - 1].2 = depth + 1;
+            ends[open] = (m, fm, depth + 1);
+            open += 1;
             continue;
         }
-        ends.pop();
+        open -= 1;
         let below = fb < 0.0;
         if !fb.is_finite() {
             known = None;
@@ -99,7 +103,7 @@ fn is_settled(
     depth: u32,
 ) -> bool {
     // No room for a place between, or nothing defined.
-    if m <= a || m >= b || fa.is_nan() && fm.is_nan() && fb.is_nan() {
+    if m <= a || m >= b || depth == DEEPEST || fa.is_nan() && fm.is_nan() && fb.is_nan() {
         return true;
     }
     let Dual { re: value, d: [slope] } = curve.enclose(a, b);
@@ -137,8 +141,8 @@ pub fn resolved(values: &[f64]) -> bool {
 /// The polynomials of a step in `s`, one for each component of the state.
 pub struct Polynomials<const D: usize> {
     /// Lowest first.
-    coefficients: [Vec<f64>; D],
-    shifted: Vec<f64>,
+    coefficients: [[f64; MOST_TERMS]; D],
+    counts: [usize; D],
 }
 
 /// A component's values, slopes and second derivatives over a piece of a step.
@@ -152,32 +156,34 @@ pub struct Range {
 impl<const D: usize> Polynomials<D> {
     /// From those in another unit of time, of which the step takes `size`.
     pub fn new(count: usize, size: f64, coefficient: impl Fn(usize, usize) -> f64) -> Self {
-        let coefficients = std::array::from_fn(|n| {
+        let mut own = Self { coefficients: [[0.0; MOST_TERMS]; D], counts: [1; D] };
+        for n in 0..D {
             let mut power = 1.0;
-            let mut list = Vec::with_capacity(count);
             for k in 0..count {
-                list.push(coefficient(n, k) * power);
+                own.coefficients[n][k] = coefficient(n, k) * power;
+                if own.coefficients[n][k] != 0.0 {
+                    own.counts[n] = k + 1;
+                }
                 power *= size;
             }
-            while list.len() > 1 && list[list.len() - 1] == 0.0 {
-                list.pop();
-            }
-            list
-        });
-        Self { coefficients, shifted: Vec::new() }
+        }
+        own
+    }
+
+    fn component(&self, n: usize) -> &[f64] {
+        &self.coefficients[n][..self.counts[n]]
     }
 
     /// The state at `s`.
     pub fn at(&self, s: f64) -> [f64; D] {
-        std::array::from_fn(|n| self.coefficients[n].iter().rev().fold(0.0, |sum, &c| sum * s + c))
+        std::array::from_fn(|n| self.component(n).iter().rev().fold(0.0, |sum, &c| sum * s + c))
     }
 
     /// All that component `n` is from `a` to `b`, with what rounding adds.
-    pub fn range(&mut self, n: usize, a: f64, b: f64) -> Range {
+    pub fn range(&self, n: usize, a: f64, b: f64) -> Range {
         let (m, r) = (0.5 * (a + b), 0.5 * (b - a));
-        let c = &mut self.shifted;
-        c.clear();
-        c.extend_from_slice(&self.coefficients[n]);
+        let (mut shifted, count) = (self.coefficients[n], self.counts[n]);
+        let c = &mut shifted[..count];
         let size = c.iter().rev().fold(0.0, |sum, &c| sum * b + c.abs());
         for i in 0..c.len() {
             for k in (i..c.len() - 1).rev() {
@@ -204,7 +210,7 @@ impl<const D: usize> Polynomials<D> {
     }
 
     /// The same as a number for a law.
-    pub fn enclose(&mut self, n: usize, a: f64, b: f64) -> Enclosed {
+    pub fn enclose(&self, n: usize, a: f64, b: f64) -> Enclosed {
         let Range { value, slope, .. } = self.range(n, a, b);
         Dual { re: value, d: [slope] }
     }
@@ -286,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_polynomials_range_contains_it() {
-        let mut cubic = Polynomials::<1>::new(4, 10.0, |_, k| [-120.0, 1.0, 2.0, -0.3][k]);
+        let cubic = Polynomials::<1>::new(4, 10.0, |_, k| [-120.0, 1.0, 2.0, -0.3][k]);
         for (a, b) in [(0.0, 1.0), (0.2, 0.25), (0.7, 0.7)] {
             let range = cubic.range(0, a, b);
             for k in 0..=50 {

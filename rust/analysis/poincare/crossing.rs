@@ -10,7 +10,7 @@ use crate::integrate::root::bracketed;
 use crate::integrate::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes};
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
-use crate::scalar::{Isa, Mask, Real};
+use crate::scalar::{Enclosed, Isa, Mask, Real};
 use crate::unroll::vector;
 
 /// Looked for to this part of the function's largest value near the crossing, and to this size.
@@ -98,6 +98,7 @@ struct Surface<'a, R: Real> {
     section: &'a Section,
     form: Form,
     stack: Vec<R>,
+    enclosed: Vec<Enclosed>,
     side: Side<R>,
     /// The function's value at the end of the last step.
     value: R,
@@ -110,6 +111,9 @@ pub struct Scan<'a, R: Real, const D: usize> {
     /// The sides that the law was taken on in the last step; the driver's are those of the next.
     sides: Sides<R>,
     room: Room<R, D>,
+    /// Room for what a lane in doubt crosses, and for what all of them cross that the places do not show.
+    brackets: Vec<Bracket>,
+    hidden: Vec<(usize, Bracket, bool)>,
     /// What was found in the last step, with the lane; in the order of time in each of them.
     crossed: Vec<(usize, Crossing<D>)>,
     /// How many crossings each lane still leaves out.
@@ -133,6 +137,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             section,
             form: Form::of(&section.function),
             stack: section.function.stack(),
+            enclosed: section.function.stack(),
             side: Side {
                 below: never,
                 above: never,
@@ -147,6 +152,8 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             surfaces: sections.iter().map(surface).collect(),
             sides: [R::mask(true); MAX_SURFACES],
             room: Room::new(),
+            brackets: Vec::with_capacity(32),
+            hidden: Vec::with_capacity(32),
             crossed: Vec::with_capacity(R::LANES * MOST_PROBES * sections.len()),
             skip: R::zero(),
             counted: matches!(sections, [only] if matches!(Form::of(&only.function), Form::Component(..))),
@@ -207,8 +214,9 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
             let doubt = surface.signs(&law, &step, moved, stretches).and(moved);
             if doubt.any() {
                 let limits = (self.count, self.skip, self.stopped);
-                let found = surface.look_closer(&law, &step, (before, doubt), stretches, limits);
-                for (lane, bracket, smooth) in found {
+                let room = (&mut self.brackets, &mut self.hidden);
+                surface.look_closer(&law, &step, (before, doubt), stretches, limits, room);
+                for &(lane, bracket, smooth) in &self.hidden {
                     let left = self.skip.lane(lane);
                     if self.counted && left > 0.0 {
                         self.skip.set_lane(lane, left - 1.0);
@@ -319,7 +327,7 @@ impl<R: Real> Surface<'_, R> {
     }
 
     /// Looks in lanes in doubt for all changes of sign. Where there are others than the stretches show, these are left to
-    /// what is returned, in the order of time in each lane: with whether the function surely has no jump or pole there.
+    /// `all`, in the order of time in each lane: with whether the function surely has no jump or pole there.
     #[inline(never)]
     fn look_closer<M: System<R, D>, const D: usize>(
         &mut self,
@@ -328,8 +336,9 @@ impl<R: Real> Surface<'_, R> {
         (before, doubt): (Side<R>, R::Mask),
         stretches: &mut [Stretch<R>],
         (count, skip, stopped): (usize, R, &dyn Fn() -> bool),
-    ) -> Vec<(usize, Bracket, bool)> {
-        let mut all = Vec::new();
+        (found, all): (&mut Vec<Bracket>, &mut Vec<(usize, Bracket, bool)>),
+    ) {
+        all.clear();
         let last = stretches.len() - 1;
         for lane in doubt.lanes() {
             let mut values = [self.value.lane(lane); MOST_PROBES + 1];
@@ -345,13 +354,19 @@ impl<R: Real> Surface<'_, R> {
                 |n: usize, k: usize| step.polynomials.component(n).get(k).map_or(0.0, |c| c.lane(lane));
             let terms = Polynomials::new(step.polynomials.component(0).len(), size, terms);
             let span = (step.from.lane(lane), size * step.polynomials.unit.lane(lane));
-            let mut curve =
-                SectionCurve::new(&self.section.function, &mut self.stack, law, lane, span, terms);
+            let mut curve = SectionCurve::new(
+                &self.section.function,
+                (&mut self.stack, &mut self.enclosed),
+                law,
+                lane,
+                span,
+                terms,
+            );
             let (below, above) = (before.below.lane(lane), before.above.lane(lane));
             let known = (below || above).then_some((0.0, values[0], below));
             let wanted = count.saturating_add(skip.lane(lane) as usize);
             let patient = |pieces: usize| !pieces.is_multiple_of(4096) || !stopped();
-            let mut found = Vec::new();
+            found.clear();
             sign_changes(&mut curve, known, (values[0], values[last + 1]), &patient, &mut |bracket| {
                 let falls = bracket.high.1 < 0.0;
                 if falls && before.falling || !falls && before.rising {
@@ -360,18 +375,18 @@ impl<R: Real> Surface<'_, R> {
                 if found.len() < wanted { Search::Next } else { Search::Enough }
             });
             // Where the places showed as many, these are the same.
-            let shown: Vec<usize> = (0..=last).filter(|&i| stretches[i].crossing.lane(lane)).collect();
-            let same = |(&i, own): (&usize, &Bracket)| {
+            let shown = || (0..=last).filter(|&i| stretches[i].crossing.lane(lane));
+            let same = |(i, own): (usize, &Bracket)| {
                 let from = if i == 0 { 0.0 } else { stretches[i - 1].s.lane(lane) / size };
                 own.low.0 <= stretches[i].s.lane(lane) / size && from <= own.high.0
             };
-            if shown.len() == found.len() && shown.iter().zip(&found).all(same) {
+            if shown().count() == found.len() && shown().zip(&*found).all(same) {
                 continue;
             }
             let others = R::Mask::from_lanes(|i| i != lane);
             stretches.iter_mut().for_each(|own| own.crossing = own.crossing.and(others));
             let scaled = |(s, value): (f64, f64)| (s * size, value);
-            for own in &found {
+            for own in &*found {
                 let slope = curve.enclose(own.low.0, own.high.0).d[0];
                 // A section of rates jumps where the law does: that is no crossing.
                 let steady = own.low.0 > 0.0 || (curve.value(0.0) < 0.0) == (own.low.1 < 0.0);
@@ -379,7 +394,6 @@ impl<R: Real> Surface<'_, R> {
                 all.push((lane, Bracket { low: scaled(own.low), high: scaled(own.high) }, smooth));
             }
         }
-        all
     }
 
     /// The crossing of a lane in a bracket, where it is one.

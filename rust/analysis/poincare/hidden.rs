@@ -17,13 +17,13 @@ pub(super) struct SectionCurve<'a, M, R: Real, const D: usize> {
     polynomials: Polynomials<D>,
     /// The components that it depends on.
     used: [bool; D],
-    room: Vec<Enclosed>,
+    room: &'a mut [Enclosed],
 }
 
 impl<'a, M: System<R, D>, R: Real, const D: usize> SectionCurve<'a, M, R, D> {
     pub fn new(
         function: &'a Expression,
-        stack: &'a mut [R],
+        (stack, room): (&'a mut [R], &'a mut [Enclosed]),
         law: &'a Law<'a, M, R>,
         lane: usize,
         span: (f64, f64),
@@ -32,7 +32,6 @@ impl<'a, M: System<R, D>, R: Real, const D: usize> SectionCurve<'a, M, R, D> {
         let uses =
             |n| [Leaf::State(n), Leaf::Rate(n)].iter().any(|&own| function.ops().contains(&Op::Push(own)));
         let used = std::array::from_fn(uses);
-        let room = function.stack();
         Self { function, stack, law, lane, span, polynomials, used, room }
     }
 }
