@@ -64,7 +64,7 @@ def roots(f: Callable[[Floats], Floats], length: float, fastest: float) -> Float
         knots.append(t[i])
     at = np.unique([*knots, t[-1]])
     values = f(at)
-    # A zero at a place of the grid is one between its neighbours; of one at the start the side after it counts.
+    # The neighbours of a place that is a zero have its sides; at the start the side behind it counts.
     at, values = at[values != 0], values[values != 0]
     if at[0] > 0:
         near = np.geomspace(1e-9 * at[0], at[0], 200)[:-1]
