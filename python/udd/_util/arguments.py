@@ -68,13 +68,6 @@ def checked_arguments(function: Callable[P, R] | None = None, *, error: type[Udd
     """
     if function is None:
         return functools.partial(checked_arguments, error=error)
-    signature = inspect.signature(function)
-    kinds = {
-        name: ast.parse(parameter.annotation, mode="eval").body
-        for name, parameter in signature.parameters.items()
-        if isinstance(parameter.annotation, str)
-        and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-    }
 
     @functools.wraps(function)
     def wrapper(*given: P.args, **options: P.kwargs) -> R:
@@ -83,17 +76,30 @@ def checked_arguments(function: Callable[P, R] | None = None, *, error: type[Udd
         except UddError:
             raise
         except _UNCLEAR as cause:
-            try:
-                values = signature.bind(*given, **options).arguments
-            except TypeError:
-                raise cause from None  # Python's own words name what is missing or not expected.
-            for name, kind in kinds.items():
-                if name in values and not _is_of(kind, values[name]):
-                    message = f"{name} must be {_in_words(kind)}, not {_shown(values[name])}"
-                    raise error(message) from cause
-            raise
+            message = _wrong_argument(function, given, options)
+            if message is None:
+                raise
+            raise error(message) from cause
 
     return wrapper
+
+
+def _wrong_argument(
+    function: Callable[..., object], given: tuple[object, ...], options: Mapping[str, object]
+) -> str | None:
+    """Return a sentence about the first argument of a wrong kind, or None."""
+    signature = inspect.signature(function)
+    try:
+        values = signature.bind(*given, **options).arguments
+    except TypeError:
+        return None  # Python's own words name what is missing or not expected.
+    for name, parameter in signature.parameters.items():
+        is_single = parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        if is_single and name in values and isinstance(parameter.annotation, str):
+            kind = ast.parse(parameter.annotation, mode="eval").body
+            if not _is_of(kind, values[name]):
+                return f"{name} must be {_in_words(kind)}, not {_shown(values[name])}"
+    return None
 
 
 def _is_of(kind: ast.expr, value: object) -> bool:
