@@ -424,6 +424,49 @@ def test_options_that_would_do_nothing_are_refused(
     assert said in failed(["fit", swing, *options], capsys)
 
 
+MECHANISM = {
+    "mechanism": {"coordinates": {"theta": "v"}, "mass": [["m"]], "forces": ["-m*k*theta - c*v"]},
+    "parameters": {"m": 2.0, "k": 15.0, "c": 0.2},
+}
+
+
+def test_a_mechanism_is_fitted_as_its_accelerations(
+    swing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    forces, rates = tmp_path / "forces.json", tmp_path / "rates.toml"
+    forces.write_text(json.dumps(MECHANISM))
+    rates.write_text(
+        'states = ["theta", "v"]\nmass = [["m"]]\n[equations]\ntheta = "v"\nv = "(-m*k*theta - c*v)/(m)"\n'
+        "[parameters]\nm = 2.0\nk = 15.0\nc = 0.2\n"
+    )
+    first, second = (
+        data(["fit", swing, "--model", path, "--free", "k,c"], capsys) for path in (forces, rates)
+    )
+    assert first["parameters"]["k"] == pytest.approx(second["parameters"]["k"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (OWN | MECHANISM, "not both: leave out mechanism, or states, equations"),
+        (
+            {
+                "states": ["theta", "b", "v", "w"],
+                "equations": {"theta": "v", "b": "w", "v": "k*(b - theta)", "w": "k*(theta - b)"},
+                "parameters": {"k": 15, "m": 2.0},
+                "mass": [["m", "0"], ["0", "1"]],
+            },
+            "the equations look like forces",
+        ),
+    ],
+)
+def test_equations_that_do_not_fit_a_mass_are_refused(
+    model: dict[str, object], said: str, swing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "own.json").write_text(json.dumps(model))
+    assert said in failed(["fit", swing, "--model", tmp_path / "own.json"], capsys)
+
+
 @pytest.mark.parametrize(
     ("argv", "said"),
     [

@@ -9,6 +9,8 @@ import pytest
 
 import udd
 from udd.errors import ModelError
+from udd.models.mechanisms import check_accelerations
+from udd.models.serialization import model_from_dict, model_to_dict
 
 G = 9.81
 
@@ -94,3 +96,69 @@ def test_chains_have_one_to_three_links() -> None:
         udd.pendulum_chain([1.0] * 4, [1.0] * 4, [1.0] * 4, [1.0] * 4)
     with pytest.raises(ModelError, match="not 2, 2, 1, 2 of them"):
         udd.pendulum_chain([1.0] * 2, [1.0] * 2, [1.0], [1.0] * 2)
+
+
+CART = {
+    "mechanism": {
+        "coordinates": {"x": "u", "a": "w"},
+        "mass": [["M + m", "m*l*cos(a)"], ["m*l*cos(a)", "m*l^2"]],
+        "forces": ["-c*u + m*l*sin(a)*w^2 + push", "-m*9.81*l*sin(a)"],
+    },
+    "parameters": {"M": 1.0, "m": 0.2, "l": 0.5, "c": 0.1},
+    "angles": ["a"],
+    "inputs": ["push"],
+}
+
+
+def test_a_mechanism_can_be_written_down() -> None:
+    made = udd.mechanism(
+        **CART["mechanism"], parameters=CART["parameters"], angles=CART["angles"], inputs=CART["inputs"]
+    )
+    read = model_from_dict({"kind": "formula", **CART})
+    assert read == made and read.mass
+    assert model_from_dict(model_to_dict(read)) == made
+    brake = {"formula": {"slot": "force(a)", "expression": "-b*w", "name": "brake", "parameters": {"b": 0.1}}}
+    assert [e.name for e in model_from_dict({"kind": "formula", **CART, "effects": [brake]}).effects] == [
+        "brake"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"states": ["x", "u"]}, "not both: leave out mechanism, or states"),
+        ({"mass": [["1"]]}, "not both: leave out mechanism, or mass"),
+        ({"mechanism": {"coordinates": {"x": "u"}, "mass": [["1"]]}}, "does not say its forces"),
+        ({"mechanism": {"coordinates": {"x": "u"}, "mass": [["1"]], "forces": []}}, "need 1 forces"),
+        ({"mechanism": {**CART["mechanism"], "force": []}}, "the mechanism has no 'force'"),
+        ({"mechanism": 3}, "the mechanism must be a table"),
+        ({"state": 3}, "a model with a mechanism has no 'state'"),
+        ({"parameters": 3}, "cannot be read"),
+    ],
+)
+def test_a_mechanism_that_does_not_fit_is_refused(changed: Any, says: str) -> None:
+    with pytest.raises(ModelError, match=says) as caught:
+        model_from_dict({"kind": "formula", **CART, **changed})
+    assert len(str(caught.value)) < 300
+
+
+def test_forces_as_accelerations_are_refused() -> None:
+    chain = udd.pendulum_chain([0.5, 0.3], [0.4, 0.3], [0.2, 0.1], [0.03, 0.01], motors=True)
+    check_accelerations(chain)
+    right = udd.mechanism(
+        {"x": "u", "y": "v"},
+        [["m", "0"], ["0", "n"]],
+        ["k*(y - x)", "k*(x - y)"],
+        {"m": 1.0, "n": 3.0, "k": 2.0},
+    )
+    check_accelerations(right)
+    # Oscillators without coupling, and a free particle, are as good as forces as they are as accelerations.
+    mass = [["m", "0"], ["0", "n"]]
+    for rates in (["u", "v", "-k*x", "-2*k*y"], ["u", "v", "-k*u", "0"]):
+        check_accelerations(udd.Model(["x", "y", "u", "v"], rates, dict(right.values), mass=mass))
+    wrong = udd.Model(
+        ["x", "y", "u", "v"], ["u", "v", "k*(y - x)", "k*(x - y)"], dict(right.values), mass=mass
+    )
+    with pytest.raises(ModelError, match="the equations look like forces") as caught:
+        check_accelerations(wrong)
+    assert len(str(caught.value)) < 300

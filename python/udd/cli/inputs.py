@@ -49,10 +49,11 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
     parser.add_argument(
         "--model",
         type=Path,
-        metavar="JSON",
-        help='a model of your own: {"states": ["x", "v"], "equations": {"x": "v", "v": "-k*x"}, '
-        '"parameters": {"k": 1.0}, "angles": []}; "state0": {"v": 0.1} beside '
-        "them says where a state starts that is not seen",
+        metavar="FILE",
+        help='a model of your own, as JSON or TOML: {"states": ["x", "v"], "equations": {"x": "v", "v": '
+        '"-k*x"}, "parameters": {"k": 1.0}, "angles": []}; or, of a mechanism M q\'\' = f, {"mechanism": '
+        '{"coordinates": {"x": "v"}, "mass": [["m"]], "forces": ["-k*x"]}, "parameters": {"m": 2.0, "k": '
+        '1.0}}; "state0": {"v": 0.1} beside them says where a state starts that is not seen',
     )
     add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
     add_pendulum(parser, "pivot to centre of mass [m] (wins over the file's header)")
@@ -280,12 +281,16 @@ def _pendulum(args: argparse.Namespace, measurement: Measurement) -> Pendulum:
 
 def own_model(args: argparse.Namespace) -> FormulaModel:
     """The user's own model, from its file."""
+    from udd.models.mechanisms import check_accelerations
     from udd.models.serialization import formula_model_from_dict
 
     refuse_others(args, "own")
     data = _own(args)
     data.pop("state0", None)
-    return formula_model_from_dict(data)
+    model = formula_model_from_dict(data)
+    if "mechanism" not in data:
+        check_accelerations(model)
+    return model
 
 
 def start_of(args: argparse.Namespace) -> Any:
@@ -297,7 +302,8 @@ def _own(args: argparse.Namespace) -> dict[str, Any]:
     """What the file of the user's own model holds."""
     from udd._util.tables import read, table
 
-    return table(str(args.model), read(args.model), error=UddError)
+    toml = args.model.suffix.lower() == ".toml"
+    return table(str(args.model), read(args.model, toml=toml), error=UddError)
 
 
 def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:

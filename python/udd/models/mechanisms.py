@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression, text_of
 from udd.errors import ModelError
@@ -90,6 +93,54 @@ def mechanism(
         delays=delays,
         observe=observe,
     )
+
+
+def check_accelerations(model: FormulaModel) -> None:
+    """Refuse forces as equations of a model with a mass matrix, whose equations must be accelerations.
+
+    At rest the forces of springs and gravity have symmetric derivatives by the coordinates. If those of the
+    equations are symmetric, and those of the mass matrix times the equations are not, the equations are the
+    forces. One coordinate cannot show that.
+
+    Raises
+    ------
+    ModelError
+        The equations are forces.
+    """
+    if len(model.speeds) < 2 or not model.mass:
+        return
+    values = dict(model.values) | dict.fromkeys(model.inputs, 0.3)
+    plain = FormulaModel(model.state_names, model.texts, values, angles=model.angles, mass=model.mass)
+    if _symmetric(plain, weighted=False) and not _symmetric(plain, weighted=True):
+        raise ModelError(
+            "the equations look like forces, but with mass they must be accelerations: for M q'' = forces "
+            'write "mechanism": {"coordinates": {"q": "v"}, "mass": ..., "forces": ...} instead'
+        )
+
+
+_STEP = 1e-4  # of a coordinate, by which differences are taken
+
+
+def _symmetric(model: FormulaModel, *, weighted: bool) -> bool:
+    """Return True if accelerations at rest, times the mass matrix if so asked, have symmetric derivatives."""
+    coordinates = [model.state_names.index(name) for name in model.speeds]
+    speeds = [model.state_names.index(name) for name in model.speeds.values()]
+
+    def forces(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        rates = model.rates(0.0, at)[..., speeds]
+        return (model.mass_matrix(at) @ rates[..., None])[..., 0] if weighted else rates
+
+    # Numbers without a pattern, in which no formula is symmetric by accident.
+    states = np.sin(np.arange(1.0, 3 * len(model.state_names) + 1)).reshape(3, -1)
+    states[:, speeds] = 0.0
+    columns = []
+    for k in coordinates:
+        step = _STEP * np.eye(states.shape[1])[k]
+        columns.append((forces(states + step) - forces(states - step)) / (2 * _STEP))
+    slopes = np.stack(columns, axis=-1)
+    if not np.isfinite(slopes).all():
+        return True
+    return bool(np.allclose(slopes, np.swapaxes(slopes, 1, 2), rtol=0.0, atol=1e-5 * np.abs(slopes).max()))
 
 
 @checked_arguments

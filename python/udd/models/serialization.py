@@ -10,11 +10,15 @@ from udd.errors import ModelError, UddError
 
 from .base import Model
 from .formula_model import FormulaModel
+from .mechanisms import mechanism
 from .registry import COMPILED
 
 #: What files call the kind of a model that is given as formulas; files of before say ``"own"``.
 _FORMULA = "formula"
 _OWN = FormulaModel._options
+#: The three of these that a mechanism's equations of motion ``M q'' = f`` take the place of.
+_ACCELERATIONS = ("states", "equations", "mass")
+_MECHANISM = ("coordinates", "mass", "forces")
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
@@ -81,6 +85,9 @@ def model_from_dict(data: object) -> Model:
 def formula_model_from_dict(data: object) -> FormulaModel:
     """The user's own model that was written down, whatever is said of its kind.
 
+    Its equations are the states' rates, or those of a mechanism: ``{"mechanism": {"coordinates": {"q": "v"},
+    "mass": [["m"]], "forces": ["-k*q"]}, ...}``.
+
     Raises
     ------
     ModelError
@@ -90,13 +97,30 @@ def formula_model_from_dict(data: object) -> FormulaModel:
     given.pop("kind", None)
     if isinstance(given.get("effects"), list):
         given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
-    given = table("a model of your own", given, _OWN, needed=_OWN[:2])
     try:
+        if "mechanism" in given:
+            return _mechanism_from_dict(given)
+        given = table("a model of your own", given, _OWN, needed=_OWN[:2])
         return FormulaModel(**given | {"parameters": dict(given.get("parameters", {}))})
     except UddError:
         raise
     except (TypeError, ValueError) as error:
         raise ModelError(f"the model cannot be read: {error}") from None
+
+
+def _mechanism_from_dict(given: dict[str, Any]) -> FormulaModel:
+    """The model of a mechanism's coordinates, mass matrix and forces."""
+    if twice := [name for name in _ACCELERATIONS if name in given]:
+        raise ModelError(
+            f"a model has a mechanism (M q'' = forces) or equations that are accelerations, not both: "
+            f"leave out mechanism, or {', '.join(twice)}"
+        )
+    equations = table("the mechanism", given.pop("mechanism"), _MECHANISM, needed=_MECHANISM)
+    rest = [name for name in _OWN if name not in _ACCELERATIONS]
+    given = table("a model with a mechanism", given, ("mechanism", *rest))
+    effects = given.pop("effects", ())
+    given["parameters"] = dict(given.get("parameters", {}))
+    return mechanism(**equations, **given).with_effects(effects)
 
 
 def effect_to_dict(effect: Effect) -> dict[str, Any]:
