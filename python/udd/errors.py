@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-_WORD, _ALL = 200, 700  # characters of one word or of what is repeated of the input, and of a message
+_WORD, _ALL = 200, 500  # characters of one word or of what is repeated of the input, and of a message
 # What stands where something else is wanted first: it may hold all of the others.
 _REPEATED = [
     re.compile(rf"{before}{{{_WORD},}}")

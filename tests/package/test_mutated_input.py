@@ -188,7 +188,7 @@ def test_what_was_made_wrong_is_refused_in_a_sentence(kind: str, count: int, tmp
         except udd.UddError as error:
             refused += 1
             said = str(error)
-            assert len(said) <= 700
+            assert len(said) <= 500
             assert "\n" not in said
             assert max(map(len, said.split())) <= 200
             assert not any(given in said for given in ("b " * 101, "'b', " * 41, "7, " * 67))
