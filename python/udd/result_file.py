@@ -275,7 +275,7 @@ def driven(equations: Any, records: list[dict[str, InputSignal]], record: int) -
     ValueError
         A model that has none, or records that do not suit it.
     """
-    model = model_from_dict(equations)
+    model = model_from_dict(equations, fitted=True)
     if not isinstance(model, FormulaModel):
         raise ValueError(model.kind)
     return model.with_inputs(*records, record=record)
@@ -289,7 +289,7 @@ def _sound(fit: Fit) -> bool:
 
 def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
     """The last object of a file."""
-    model = model_from_dict(tree["model"])
+    model = model_from_dict(tree["model"], fitted=True)
     curves = {(slot.name, slot.momentum): slot for slot in slots(model)}
     objects: list[Any] = []
     numbers: dict[str, Callable[[Any], Any]] = {
@@ -301,7 +301,7 @@ def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
         "object": objects.__getitem__,
     }
     made: dict[str, Callable[[Any], Any]] = {
-        "model": model_from_dict,
+        "model": functools.partial(model_from_dict, fitted=True),
         "driven": lambda x: driven(x["equations"], value(x["records"]), x["record"]),
         "effect": effect_from_dict,
         "slot": lambda x: curves[x[0], x[1]],

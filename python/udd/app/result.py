@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from udd.errors import ModelError
 from udd.models import Disk
 from udd.models.serialization import model_to_dict
 from udd.report import tables, wording
 from udd.report.document import text_of
+
+from .spec import model_of
 
 
 def of(found: Any) -> dict[str, Any]:
@@ -59,4 +62,9 @@ def _explore(found: Any) -> dict[str, Any] | None:
     model = found.fit.models[0]
     if not isinstance(model, Disk) or any(e.made is not None for e in model.effects):
         return None
-    return {"model": model_to_dict(model), "state": found.fit.states[0].tolist()}
+    written = model_to_dict(model)
+    try:
+        model_of(written)
+    except ModelError:  # a fitted value outside its physical range
+        return None
+    return {"model": written, "state": found.fit.states[0].tolist()}

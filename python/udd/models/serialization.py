@@ -54,13 +54,20 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             result[name] = getattr(model, name)
         if "effects" in result:
             result["effects"] = [effect_to_dict(effect) for effect in model.effects]
-        if model_from_dict(result) == model:
+        if model_from_dict(result, fitted=True) == model:
             return result
     raise ModelError(f"this model cannot be written down: {model!r}")
 
 
-def model_from_dict(data: object) -> Model:
-    """The model that `model_to_dict` or a person wrote down.
+def model_from_dict(data: object, *, fitted: bool = False) -> Model:
+    """Make the model that `model_to_dict` or a person wrote down.
+
+    Parameters
+    ----------
+    data : mapping
+    fitted : bool
+        Whether it may come from a fit: friction and drive may then be outside their physical ranges, as in
+        :meth:`udd.Model.with_parameters`.
 
     Raises
     ------
@@ -79,7 +86,11 @@ def model_from_dict(data: object) -> Model:
         given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
     cls = COMPILED[kind]
     known = (*cls._plain, *cls._options)
-    return cls(**table(f"a {kind}", given, known, needed=known[:1]))
+    arguments = table(f"a {kind}", given, known, needed=known[:1])
+    if not fitted:
+        return cls(**arguments)
+    plain = {name: value for name, value in arguments.items() if name in cls._plain}
+    return cls(**arguments | dict.fromkeys(plain, 1.0)).with_parameters(plain)
 
 
 def formula_model_from_dict(data: object) -> FormulaModel:

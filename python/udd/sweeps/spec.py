@@ -81,7 +81,7 @@ class SweepSpec:
         if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
             raise ModelError(f"quantity must be one of {', '.join(QUANTITIES)}, not {self.quantity!r}")
         require_model(self.model)
-        model_to_dict(self.model)
+        model_from_dict(model_to_dict(self.model))  # as the store's text is read back
         if not isinstance(self.over, Mapping) or not 1 <= len(self.over) <= 3:
             raise ModelError("over must name one to three axes with their values")
         over = {name: _axis(self.model, name, values) for name, values in self.over.items()}
