@@ -21,7 +21,7 @@ from starlette.testclient import TestClient
 
 import udd
 from app_for_tests import CHAOS, SOCKET, client
-from udd.app import jobs, limits, report_parts, uploads, worker
+from udd.app import error_text, jobs, limits, report_parts, uploads, worker
 from udd.report.document import Column, Figure, Gallery, Head, Image, Report, Section, Table
 
 __all__ = ["client"]
@@ -67,6 +67,40 @@ def test_a_file_that_cannot_be_used_gets_one_sentence(client: TestClient, conten
     assert "\n" not in said["answer"]["error"]
     assert "udd-app" not in said["answer"]["error"]  # no path of this machine
     assert not any(folder.exists() for folder in folders(client))
+
+
+@pytest.mark.parametrize(
+    ("error", "shown"),
+    [
+        (
+            "the data take more than the limit of 1 GB (limit=1e10 allows more)",
+            "The data take more than the limit of 1 GB.",
+        ),
+        (
+            'row 3 repeats the time (repeated="first" keeps the first of such rows)',
+            "Row 3 repeats the time.",
+        ),
+        (
+            "line 9 goes back in time (part=0, part=1 ... reads the rows between such jumps)",
+            "Line 9 goes back in time.",
+        ),
+        (
+            "no column t: found a; of evenly spaced samples say how many a second, rate=",
+            "No column t: found a.",
+        ),
+        (
+            "no column t: found a, b; which of them is it, columns={'t': ...}?",
+            "No column t: found a, b.",
+        ),
+        (
+            'no header names the columns: say what they are, for example columns="t,theta,_"',
+            "No header names the columns: say what they are.",
+        ),
+        ("W is 4.2 m/s (expected 0.042): is it in cm/s?", "W is 4.2 m/s (expected 0.042): is it in cm/s?"),
+    ],
+)
+def test_the_page_names_no_argument_of_python(error: str, shown: str) -> None:
+    assert error_text.sentence(ValueError(error)) == shown
 
 
 def test_an_upload_that_names_files_of_the_host_is_refused(client: TestClient, tmp_path: Path) -> None:

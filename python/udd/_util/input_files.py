@@ -25,8 +25,8 @@ class MemoryLimit:
 
     Parameters
     ----------
-    limit : float
-        Bytes.
+    limit : float, optional
+        Bytes; by default `LARGEST`, if the public function has no argument `limit` that allows more.
     error : type
         Kind of `UddError` to raise.
 
@@ -45,7 +45,9 @@ class MemoryLimit:
     udd.errors.UddError: the data take more than the limit of 100 bytes (limit=1e3 allows more)
     """
 
-    def __init__(self, limit: float = LARGEST, error: type[UddError] = UddError) -> None:
+    def __init__(self, limit: float | None = None, error: type[UddError] = UddError) -> None:
+        self.is_argument = limit is not None
+        limit = LARGEST if limit is None else limit
         number = isinstance(limit, int | float | np.integer | np.floating) and not isinstance(limit, bool)
         if not (number and math.isfinite(limit) and limit >= 1):
             raise error(f"limit must be a positive number of bytes, not {limit!r:.80}")
@@ -69,10 +71,9 @@ class MemoryLimit:
 
     def exceeded(self) -> UddError:
         """The error of data that are too large."""
-        more = re.sub(r"e\+0*", "e", f"{10 * self.limit:.0e}")
-        return self.error(
-            f"the data take more than the limit of {in_bytes(self.limit)} (limit={more} allows more)"
-        )
+        more = re.sub(r"e\+0*", "e", f" (limit={10 * self.limit:.0e} allows more)")
+        said = f"the data take more than the limit of {in_bytes(self.limit)}"
+        return self.error(said + more * self.is_argument)
 
 
 def in_bytes(size: float) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 from udd.errors import ModelError, UddError
 
-from .input_files import LARGEST, NESTED, MemoryLimit, read_regular
+from .input_files import NESTED, MemoryLimit, read_regular
 
 _LONGEST = 100  # characters of a name
 _DEEPEST = 16  # lists and tables within each other
@@ -73,7 +73,9 @@ def parsed(what: str, text: str, *, toml: bool = False, error: type[UddError] = 
         raise error(f"{what} is not {'TOML' if toml else 'JSON'}: {reason}") from None
 
 
-def read(path: Path, *, toml: bool = False, error: type[UddError] = UddError, limit: float = LARGEST) -> Any:
+def read(
+    path: Path, *, toml: bool = False, error: type[UddError] = UddError, limit: float | None = None
+) -> Any:
     """Parse a file in JSON or TOML.
 
     Parameters

@@ -1,9 +1,23 @@
-"""What is said to a person who is told that something does not work."""
+"""Sentences for a person who is told that something does not work."""
 
 from __future__ import annotations
 
+import functools
+import inspect
+import re
+
 
 def sentence(error: object) -> str:
-    """What is wrong, with a capital and a full stop."""
-    text = " ".join(str(error).split())
+    """Return what is wrong with a capital and a full stop, without advice to callers from Python."""
+    text = _python_advice().sub("", " ".join(str(error).split()))
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
+
+
+@functools.cache
+def _python_advice() -> re.Pattern[str]:
+    """Match a bracket, clause or example that names an argument of `udd.read_measurement`."""
+    from udd.measurement import read_measurement
+
+    arguments = list(inspect.signature(read_measurement).parameters)[1:-1]
+    name = rf"\b(?:{'|'.join(arguments)})="
+    return re.compile(rf" \([^()]*{name}[^()]*\)|; [^;]*?{name}[^;]*$|, for example {name}.*$")

@@ -50,7 +50,8 @@ def main() -> None:
             warnings.simplefilter("always", UserWarning)
             OUT.mkdir()
             done = JOBS[asked["kind"]](asked, tell)
-        done["warnings"] = [str(w.message) for w in warned if issubclass(w.category, UserWarning)]
+        told = [w.message for w in warned if issubclass(w.category, UserWarning)]
+        done["warnings"] = [_sentence(message, asked.get("file", "")) for message in told]
         tell({"done": done})
     except UddError as error:
         tell({"error": _sentence(error, asked.get("file", ""))})
@@ -58,7 +59,7 @@ def main() -> None:
         tell({"error": "This takes more memory than a job may have."})
 
 
-def _sentence(error: Exception, file: str) -> str:
+def _sentence(error: object, file: str) -> str:
     """What is wrong, without the name that the file has here."""
     text = str(error)
     if file:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd.errors import IncompleteWarning, UddError
 
+from .option_names import OPTIONS
 from .options import new
 from .output import CommandResult, is_terminal
 
@@ -41,6 +42,13 @@ def add(commands: Any) -> None:
         "--store", type=Path, required=True, metavar="ZARR", help="folder for the result; made if new"
     )
     parser.add_argument(
+        OPTIONS["limit"],
+        dest="limit",
+        type=float,
+        metavar="BYTES",
+        help="bytes of memory that the spec may take (default: 1e9)",
+    )
+    parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, such as tcp://host:8786"
     )
 
@@ -49,7 +57,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is in the store."""
     from udd.sweeps import SweepSpec, sweep
 
-    spec = SweepSpec.read(args.spec)
+    spec = SweepSpec.read(args.spec, **({} if args.limit is None else {"limit": args.limit}))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         if args.dask is None:
