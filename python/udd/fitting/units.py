@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -41,15 +42,19 @@ class Scale:
         """The factors of columns or states."""
         return np.array([self.factors.get(name, 1.0) for name in names])
 
+    def values(self, values: Array, names: Sequence[str]) -> Array:
+        """The numbers of columns or states in the other unit."""
+        shift = np.array([self.shifts.get(name, 0.0) for name in names])
+        result: Array = values * self.sizes(names) + shift
+        return result
+
     def record(self, record: Record, columns: Sequence[str], states: Sequence[str]) -> Record:
         """The record in the other unit."""
-        size, shift = self.sizes(columns), np.array([self.shifts.get(name, 0.0) for name in columns])
-        moved = np.array([self.shifts.get(name, 0.0) for name in states])
         return replace(
             record,
-            seen=np.where(record.observed, record.seen * size + shift, 0.0),
-            sigma=record.sigma * size,
-            states=record.states * self.sizes(states) + moved,
+            seen=np.where(record.observed, self.values(record.seen, columns), 0.0),
+            sigma=record.sigma * self.sizes(columns),
+            states=self.values(record.states, states),
         )
 
     def density(self, record: Record, columns: Sequence[str]) -> float:
@@ -74,15 +79,18 @@ def ask(measurements: Sequence[Measurement], models: Sequence[Model]) -> None:
         Which numbers, and what they may be instead.
     """
     for measurement, model in zip(measurements, models, strict=True):
-        seen = measurement.seen
-        if seen.sum() < 3:
-            continue  # which a fit refuses
-        step = float(np.median(np.diff(measurement.t)))
-        if model.kind != measurement.kind:
-            continue
-        mistaken = model.profile.fit.mistaken_unit(model, step, measurement.values[seen])
-        if mistaken:
+        if mistaken := _mistaken(measurement, model, STATED):
             raise FitError(mistaken)
+
+
+def _mistaken(measurement: Measurement, model: Model, scale: Scale) -> str | None:
+    """Return the sentence about numbers that cannot be in a unit, or None."""
+    seen = measurement.seen
+    if seen.sum() < 3 or model.kind != measurement.kind:  # which a fit refuses
+        return None
+    step = float(np.median(np.diff(measurement.t)))
+    values = scale.values(measurement.values[seen], measurement.names)
+    return model.profile.fit.mistaken_unit(model, step, values)
 
 
 def drive_seen(measurement: Measurement) -> float:
@@ -117,21 +125,32 @@ def other_unit(
     last = record.part(~record.first(_FIRST))
     margin = _CLEARLY * np.array([record.observed.sum(), last.observed.sum()])
 
-    def explained(
-        own: Sequence[Model], scale: Scale, fixed: frozenset[str], start: Sequence[Model] | None = None
-    ) -> Array:
-        """The evidence of the record, and of its last part by itself."""
+    def evidence(
+        part: Record,
+        own: Sequence[Model],
+        scale: Scale,
+        fixed: frozenset[str],
+        start: Sequence[Model] | None = None,
+    ) -> float:
+        """The evidence of a part of the record; -inf if it cannot be fitted."""
         columns, states = short[0].names, own[0].state_names
-        shown = []
-        for some in (record, last):
-            try:
-                fitted = fit(scale.record(some, columns, states), short, own, start or own, scale, fixed)
-            except FitError:
-                return np.array([-np.inf, -np.inf])
-            shown.append(fitted.evidence + scale.density(some, columns))
-        return np.array(shown)
+        try:
+            fitted = fit(scale.record(part, columns, states), short, own, start or own, scale, fixed)
+        except FitError:
+            return -np.inf
+        return fitted.evidence + scale.density(part, columns)
 
-    stated: dict[frozenset[str], Array] = {}
+    def as_stated(own: Sequence[Model], fixed: frozenset[str], start: Sequence[Model]) -> Array:
+        """The evidence of the record, and of its last part by itself, in the stated unit."""
+        both = [evidence(part, own, STATED, fixed, start) for part in (record, last)]
+        return np.array(both if min(both) > -np.inf else [-np.inf, -np.inf])
+
+    @functools.cache
+    def stated(fixed: frozenset[str]) -> Array:
+        starts = [models] if fixed else [models, *ends]
+        best: Array = np.max([as_stated(models, fixed, start) for start in starts], axis=0)
+        return best
+
     best, text = -np.inf, None
     for tried in zip(*(_units(*pair) for pair in zip(short, models, strict=True)), strict=True):
         units = [unit for unit in tried if unit]
@@ -139,20 +158,18 @@ def other_unit(
             continue
         own = [model.with_parameters({**model.parameters, **u.parameters}) if u.parameters else model
                for model, u in zip(models, units, strict=True)]  # fmt: skip
-        doubted = frozenset(units[0].parameters)
-        found = explained(own, Scale(units[0].factors, units[0].shifts), doubted)
-        if not found[0] > best:
+        doubted, scale = frozenset(units[0].parameters), Scale(units[0].factors, units[0].shifts)
+        if any(_mistaken(*pair, scale) for pair in zip(short, own, strict=True)):
+            continue  # who stated this unit would be refused
+        # The last part first: a wrong unit may spin a pendulum so fast that the whole takes seconds.
+        if not evidence(last, own, scale, doubted) > stated(doubted)[1] + margin[1]:
             continue
-        for fixed in {doubted, frozenset[str]()}:
-            if fixed not in stated:
-                tries = [explained(models, STATED, fixed)]
-                tries += [] if fixed else [explained(models, STATED, fixed, end) for end in ends]
-                stated[fixed] = np.max(tries, axis=0)
-        clearly = (found > stated[doubted] + margin).all() and found[0] > stated[frozenset()][0]
+        found = evidence(record, own, scale, doubted)
+        clearly = found > max(best, stated(doubted)[0] + margin[0], stated(frozenset())[0])
         if clearly and doubted:  # of two wrong lengths the nearer is no right one
-            clearly = explained(own, STATED, frozenset())[0] < found[0] + margin[0]
+            clearly = as_stated(own, frozenset(), own)[0] < found + margin[0]
         if clearly:
-            best, text = float(found[0]), units[0].text
+            best, text = found, units[0].text
     return text
 
 
