@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import udd
+from own_process import memory_error_of
 from udd import effects
 from udd.errors import IncompleteWarning, IntegrationError, UddError
 
@@ -266,18 +267,6 @@ def test_ctrl_c_is_answered_within_0_2_s(call: str) -> None:
     assert worked.min() < 0.2 * os.cpu_count() and wall.min() < 5  # type: ignore[operator]
 
 
-LARGE = """
-import resource
-import numpy as np, udd
-resource.setrlimit(resource.RLIMIT_AS, (3 << 29, 3 << 29))
-try:
-    {call}
-except MemoryError as error:
-    print(error)
-print(udd.simulate(udd.DLE(1.0), 1.0, [1, 1, 1]).outcome)
-"""
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit of memory for a process of its own")
 @pytest.mark.parametrize(
     ("call", "said"),
@@ -302,11 +291,8 @@ print(udd.simulate(udd.DLE(1.0), 1.0, [1, 1, 1]).outcome)
     ids=["steps", "polynomials", "runs", "points"],
 )
 def test_what_does_not_fit_into_memory_is_said(call: str, said: str) -> None:
-    code = LARGE.format(call=call)
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    message, after = out.stdout.splitlines()
+    message = memory_error_of(call, limit=3 << 29)
     assert re.match(said, message), message
-    assert after == "finished"
 
 
 def test_arrays_that_are_not_aligned_are_copied() -> None:

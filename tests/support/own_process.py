@@ -31,3 +31,28 @@ def output_of(code: str, seconds: float = 30.0) -> str:
         raise AssertionError(f"not finished after {seconds:g} s") from error
     assert process.returncode == 0, f"exit code {process.returncode}: {said[-2000:]}"
     return printed
+
+
+LITTLE_MEMORY = """
+import resource
+import numpy as np, udd
+resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}))
+try:
+    {call}
+except MemoryError as error:
+    print(error)
+print(udd.simulate(udd.DLE(1.0), 1.0, [1, 1, 1]).outcome)
+"""
+
+
+def memory_error_of(call: str, limit: int = 2 << 30, seconds: float = 60.0) -> str:
+    """Run a call that needs more memory than the limit (bytes), and return the words of its MemoryError.
+
+    Raises
+    ------
+    AssertionError
+        It is not refused in one line, or a short run does not finish afterwards.
+    """
+    printed = output_of(LITTLE_MEMORY.format(call=call, limit=limit), seconds).splitlines()
+    assert len(printed) == 2 and printed[1] == "finished", printed
+    return printed[0]
