@@ -14,24 +14,16 @@ pytest.importorskip("av", reason="the tracker's extra is not installed")
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import udd
+from small_films import SMALL, shot
 from tracked_errors import errors, rms
 from udd.cli import main
 from udd.errors import IncompleteWarning, UddError
-from udd.film import Defects, Film
+from udd.film import Defects
 from udd.markers.layout import BODY
 from udd.tracking import overlay, pictures_at
 from udd.tracking.detection.colour_blobs import COLOURS, Blobs, squares
 from udd.tracking.metric.pixels_to_metres import left_the_wheels
 from udd.video import reader
-
-SMALL = (276, 350)  # pixels: half of the paper's, 878 per metre
-
-
-def shot(
-    path: Path, seconds: float = 3.6, start: tuple[float, ...] = (1, 0.02, -0.02, 0.3), **more: Any
-) -> Film:
-    run = udd.simulate(udd.Disk(0.039), np.arange(0, seconds, 0.005), list(start), dense=True)
-    return udd.render(run, path, size=SMALL, **more)
 
 
 def test_a_rolling_shutter_is_found_and_undone(tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ class Case:
 
 
 GLUED = ((0.0010, -0.0004), (-0.0008, 0.0006), (0.0003, 0.0010), (-0.0006, -0.0009))
+BESIDE = {"size": (900, 700), "scale": 1750.0, "pivot": (620.0, 330.0)}
 CASES = (
     Case("clean", (0.02, 0.3, 0.0), {"exposure": 0.002, "support": 0.0}),
     Case("standard", (0.04, 0.5, 0.01)),
@@ -59,6 +60,15 @@ CASES = (
     Case("wobble 10 degrees", (1.0, 10.0, 0.01), {}, {"wobble": math.radians(10)}),
     Case("HEVC, quality 30", (0.08, 1.0, 0.01), {"codec": "hevc", "quality": 30.0}),
     Case("noise 8 of 255", (0.06, 0.8, 0.01), {"noise": 8.0}),
+    # films as people make them; the reference of a camera's roll is its mean
+    Case("picture of the device", (0.04, 0.5, 0.01), BESIDE, {"poster": 1.0}),
+    Case("mirrored", (0.04, 0.5, 0.01), {}, {"mirrored": True}),
+    Case("held in the hand, 2 px", (0.05, 1.5, 0.01), {}, {"shake": 2.0}),
+    Case("held in the hand, 8 px", (0.08, 3.0, 0.02), {}, {"shake": 8.0}),
+    Case("bumped", (0.05, 0.7, 0.01), {}, {"bumps": ((6.0, 14.0, -9.0),)}),
+    Case("bumped and back", (0.05, 0.7, 0.01), {}, {"bumps": ((6.0, 14.0, -9.0), (8.0, 0.0, 0.0))}),
+    Case("zoomed by 1.25", (0.05, 0.7, 0.02), {}, {"zooms": ((6.0, 1.25),)}),
+    Case("exposure in steps", (0.05, 0.7, 0.02), {}, {"gains": ((4.0, 0.7), (8.0, 1.0))}),
 )
 
 

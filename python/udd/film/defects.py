@@ -56,6 +56,26 @@ class Defects:
         Frames without a picture.
     after : float
         Time in s for which the film goes on after the run's end, with the disk falling freely.
+    poster : float
+        Size of a picture of the device that hangs on the wall beside it, relative to the device; 0: none.
+    mirrored : bool
+        The film shows left as right, as selfie cameras do.
+    turned : int
+        Quarter turns clockwise by which the whole film is turned.
+    shake : float
+        Motion of a camera held in the hand, pixels r.m.s.; it also rolls a little.
+    bumps : sequence of (float, float, float)
+        Times in s from which on the camera looks elsewhere, and by how many pixels (right, down) the picture
+        then lies off its first place.
+    zooms : sequence of (float, float)
+        Times in s from which on the picture is enlarged, and by which factor.
+    gains : sequence of (float, float)
+        Times in s from which on the camera takes more light or less, and the factor.
+    hands : sequence of (float, float)
+        Times in s from which and until which a hand hides the disk.
+    clock : sequence of (float, float)
+        Times in s, by the film's own clock, from which on the motion is shown slower than the stamps say, and
+        by which factor.
 
     Examples
     --------
@@ -80,12 +100,22 @@ class Defects:
     repeated: Sequence[int] = ()
     black: Sequence[int] = ()
     after: float = 0.0
+    poster: float = 0.0
+    mirrored: bool = False
+    turned: int = 0
+    shake: float = 0.0
+    bumps: Sequence[Sequence[float]] = ()
+    zooms: Sequence[Sequence[float]] = ()
+    gains: Sequence[Sequence[float]] = ()
+    hands: Sequence[Sequence[float]] = ()
+    clock: Sequence[Sequence[float]] = ()
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""
         ranges = {
             "clutter": (0, 1000), "bars": (0, 20), "distance": (0.3, 100), "lens": (-0.3, 0.3),
             "readout": (0, 1), "gradient": (-1, 1), "flicker": (0, 0.9), "wobble": (0, 0.5), "after": (0, 60),
+            "poster": (0, 2), "turned": (-3, 3), "shake": (0, 50),
         }  # fmt: skip
         for name, (low, high) in ranges.items():
             value = getattr(self, name)
@@ -96,6 +126,14 @@ class Defects:
             value = np.asarray(getattr(self, name), dtype=np.float64)
             if value.shape != shape or not np.isfinite(value).all():
                 raise UddError(f"{name} must be finite numbers of shape {shape}, got {getattr(self, name)!r}")
+        for name, width, least in (("bumps", 3, -1e3), ("zooms", 2, 0.2), ("gains", 2, 0.01),
+                                   ("hands", 2, 0.0), ("clock", 2, 0.01)):  # fmt: skip
+            rows = np.asarray(getattr(self, name), dtype=np.float64).reshape(-1, width)
+            times = rows[:, 0] if name != "hands" else rows.ravel()
+            if not (np.isfinite(rows).all() and (np.diff(times) > 0).all() and (rows[:, 1:] >= least).all()):
+                raise UddError(
+                    f"{name} must be rows of {width} numbers at increasing times, got {getattr(self, name)!r}"
+                )
         if max(abs(a) for a in self.off_axis) > 0.8:
             raise UddError(f"off_axis must be at most 0.8 rad, got {tuple(self.off_axis)!r}")
         if not all(0 <= s <= 1 for s in self.mark_strength):
@@ -109,7 +147,12 @@ class Defects:
     @property
     def lights(self) -> bool:
         """Whether the light is uneven in space or in time."""
-        return bool(self.gradient or self.flicker)
+        return bool(self.gradient or self.flicker or len(self.gains))
+
+    @property
+    def moves(self) -> bool:
+        """Whether the camera moves or zooms."""
+        return bool(self.shake or len(self.bumps) or len(self.zooms))
 
     def __repr__(self) -> str:
         """Only what is not as it should be."""
@@ -156,8 +199,51 @@ def lit(light: Picture, time: float, defects: Defects) -> Picture:
     """Return the picture under uneven light."""
     width = light.shape[1]
     across = 1 + defects.gradient * (np.arange(width, dtype=np.float32) / np.float32(width - 1) - 0.5)
-    now = 1 + defects.flicker * math.sin(2 * math.pi * time / FLICKER_PERIOD)
+    now = _last(defects.gains, time, (1.0,))[0]
+    now *= 1 + defects.flicker * math.sin(2 * math.pi * time / FLICKER_PERIOD)
     return np.asarray(np.minimum(light * (across * np.float32(now))[None, :, None], 1), dtype=np.float32)
+
+
+def _last(rows: Sequence[Sequence[float]], time: float, before: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the values of the last row whose time has come."""
+    said = before
+    for begin, *values in rows:
+        if time >= begin:
+            said = tuple(float(v) for v in values)
+    return said
+
+
+def view_of(camera: Camera, time: float, defects: Defects) -> NDArray[np.float64]:
+    """Return the affine map (2, 3) from pixels of a steady camera's picture to those of the moving one's."""
+    random = np.random.Generator(np.random.PCG64(11))
+    frequency, phase = random.uniform(0.4, 3.5, (3, 5)), random.uniform(0, 2 * math.pi, (3, 5))
+    sway = np.sin(2 * math.pi * frequency * time + phase).sum(axis=1) * math.sqrt(2 / 5) * defects.shake
+    du, dv = _last(defects.bumps, time, (0.0, 0.0))
+    roll, zoom = 0.3 * sway[2] / max(camera.size), _last(defects.zooms, time, (1.0,))[0]
+    c, s = zoom * math.cos(roll), zoom * math.sin(roll)
+    u, v = (camera.size[0] - 1) / 2, (camera.size[1] - 1) / 2
+    return np.array([[c, -s, u - c * u + s * v + sway[0] + du], [s, c, v - s * u - c * v + sway[1] + dv]])
+
+
+def real_times(stamps: NDArray[np.float64], clock: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+    """Return when the frames with these stamps were exposed, where parts of the film are slowed down."""
+    if not len(clock):
+        return stamps
+    begin, slower = np.array([0.0, *(row[0] for row in clock)]), np.array([1.0, *(row[1] for row in clock)])
+    real = np.concatenate([[0.0], np.cumsum(np.diff(begin) / slower[:-1])])
+    part = np.searchsorted(begin, stamps, side="right") - 1
+    return np.asarray(real[part] + (stamps - begin[part]) / slower[part])
+
+
+def hand(picture: Picture, camera: Camera, time: float, defects: Defects) -> Picture:
+    """Lay a hand over the disk, as long as one is there; it comes from the right."""
+    from .scene import dot, over, paint
+
+    if not any(begin <= time < end for begin, end in defects.hands):
+        return picture
+    skin = (198, 150, 122)
+    shapes = [dot(0.01 + 0.05 * k, 0.02 * k, 0.12, skin) for k in range(4)]
+    return over(paint(shapes, camera, 1.5), picture)
 
 
 def hung(picture: Picture, camera: Camera, count: int, unit: float) -> Picture:
@@ -177,3 +263,23 @@ def hung(picture: Picture, camera: Camera, count: int, unit: float) -> Picture:
         corners, paint_of = box(y, z, y + side, z + side, (red, green, blue))
         shapes.append((corners * unit, paint_of))
     return over(paint(shapes, camera, 0.6), picture)
+
+
+def with_poster(picture: Picture, camera: Camera, defects: Defects) -> Picture:
+    """Hang a picture of the device on the wall, as large as `poster` says, in the upper left corner."""
+    import cv2
+
+    from .scene import front_shapes, over, paint
+    from .sprite import FINE, disk_sprite
+
+    size = defects.poster
+    radius = 0.08 * camera.scale * size
+    at = (1.15 * radius, 1.15 * radius)
+    sprite = disk_sprite(radius, 0.6)
+    middle, turn = (sprite.shape[0] - 1) / 2, 0.4
+    c, s = FINE * math.cos(turn), FINE * math.sin(turn)
+    inverse = np.array([[c, s, middle - c * at[0] - s * at[1]], [-s, c, middle + s * at[0] - c * at[1]]])
+    shown = cv2.warpAffine(sprite, inverse, camera.size, flags=cv2.INTER_AREA | cv2.WARP_INVERSE_MAP)
+    small = Camera(camera.size, camera.scale * size, at, 0.0, camera.rate, camera.exposure)
+    support = [(0.5 * corners, colour) for corners, colour in front_shapes(1.0, 1.0)]
+    return over(paint(support, small, 0.6), over(np.asarray(shown, dtype=np.float32), picture))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .camera import Camera
-from .defects import WOBBLE_PERIOD, Defects, lit, source_of_pixels
+from .defects import WOBBLE_PERIOD, Defects, hand, lit, source_of_pixels, view_of
 from .light import Picture, to_code
 from .motion import Array, Motion
 from .scene import back_shapes, blurred, front_shapes, over, paint
@@ -47,15 +47,16 @@ class Scene:
         self.shade = _shadow(self.radius)
         self._still = over(front, self.below)
         self.bent = source_of_pixels(camera, defects) if defects.bends else None
-        self.plain = not (defects.bends or defects.lights)
+        self.plain = not (defects.bends or defects.lights or defects.moves or len(defects.hands))
         self._codes = to_code(self._still)
         self._picture = np.empty_like(self._codes)
 
-    def expose(self, motion: Motion, time: float) -> Picture:
+    def expose(self, motion: Motion, time: float, stamp: float | None = None) -> Picture:
         """Return the unrounded codes (height, width, 3) of the frame whose exposure is centred on `time`.
 
-        The next call writes into the same array.
+        The next call writes into the same array. `stamp` is the film's own time, `time` if not given.
         """
+        stamp = time if stamp is None else stamp
         times = sub_times(motion, time, self.camera, self.radius, self.defects.readout)
         states = motion(times)
         centres = self.camera.to_pixel(states[:, 1], states[:, 2])
@@ -68,7 +69,7 @@ class Scene:
             part = (slice(low[1], high[1]), slice(low[0], high[0]))
             light = self._disk(times - time, states, centres - low, squeeze, part)
             picture[part] = to_code(light) if self.plain else light
-        return picture if self.plain else self._developed(picture, time)
+        return picture if self.plain else self._developed(picture, stamp)
 
     def _disk(
         self, times: Array, states: Array, centres: Array, squeeze: Array, part: tuple[slice, slice]
@@ -100,11 +101,18 @@ class Scene:
         """Codes of what the lens and the lamps make of a true-to-scale picture's light."""
         import cv2
 
+        if len(self.defects.hands):
+            light = hand(light, self.camera, time, self.defects)
         if self.bent is not None:
             light = np.asarray(
                 cv2.remap(light, *self.bent, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),
                 dtype=np.float32,
             )
+        if self.defects.moves:
+            view = view_of(self.camera, time, self.defects)
+            how = cv2.INTER_LANCZOS4
+            moved = cv2.warpAffine(light, view, self.camera.size, flags=how, borderMode=cv2.BORDER_REPLICATE)
+            light = np.asarray(moved, dtype=np.float32)
         if self.defects.lights:
             light = lit(light, time, self.defects)
         return to_code(np.clip(light, 0, 1))

@@ -21,7 +21,7 @@ from udd.measurement import Measurement
 from udd.video.writer import CODECS, checked_path, require_video, write_film
 
 from .camera import CAMERA_OPTIONS, Camera, CameraOptions, make_camera
-from .defects import Defects, hung
+from .defects import Defects, hung, real_times, with_poster
 from .exposure import Scene
 from .light import Noise, Picture, to_light
 from .motion import Array, Motion, TrajectoryLike, checked, motion_of, spacing_error, then_falling
@@ -41,7 +41,8 @@ class Film:
     path : Path
         The film file.
     t : ndarray, shape (n,)
-        Time stamp of each frame in the file, s: frame k has k / fps. It is the middle of the exposure.
+        Time of the middle of each frame's exposure, s: of frame k that is k / fps, which is also its stamp in
+        the file unless the defect `clock` slows a part of the film down.
     state : ndarray, shape (n, 4)
         [Omega, Y, Z, beta] of the disk in the middle of each exposure, rad/s, m, m, rad.
     held : ndarray of bool, shape (n,)
@@ -184,19 +185,24 @@ def render(
     wall = _background(background, view, radius)
     if defects.clutter:
         wall = hung(wall, view, defects.clutter, radius / 0.08)
+    if defects.poster:
+        wall = with_poster(wall, view, defects)
     scene = Scene(view, radius, wall, support, defects, _patches(layout, radius))
+    upright = defects.turned % 2 == 0
+    real = real_times(stamps, defects.clock)
+    shown = t[0] + real
     write_film(
         target,
-        _frames(scene, motion, t[0] + stamps, numbers, defects, Noise(noise, random), progress),
-        view.size,
+        _frames(scene, motion, shown, t[0] + stamps, numbers, defects, Noise(noise, random), progress),
+        view.size if upright else view.size[::-1],
         view.rate,
         quality,
         codec,
         numbers.tolist(),
     )
-    times = stamps[numbers]
-    held = times + t[0] <= t[-1]
-    state = motion(t[0] + times)
+    times = real[numbers]
+    held = shown[numbers] <= t[-1]
+    state = motion(shown[numbers])
     return Film(target, times, state, held, view.size, view.scale, view.pivot, radius)
 
 
@@ -213,6 +219,7 @@ def _frames(
     scene: Scene,
     motion: Motion,
     times: Array,
+    stamps: Array,
     numbers: NDArray[np.intp],
     defects: Defects,
     noise: Noise,
@@ -223,7 +230,11 @@ def _frames(
     last: NDArray[np.uint8] | None = None
     for number in tqdm(numbers.tolist(), desc="film", unit="frame", disable=not progress):
         if number not in defects.repeated or last is None:
-            last = noise.on(scene.expose(motion, float(times[number])))
+            last = noise.on(scene.expose(motion, float(times[number]), float(stamps[number])))
+            if defects.mirrored:
+                last = np.ascontiguousarray(last[:, ::-1])
+            if defects.turned:
+                last = np.ascontiguousarray(np.rot90(last, -defects.turned))
         yield np.zeros_like(last) if number in defects.black else last
 
 

@@ -6,9 +6,10 @@ from udd.errors import MeasurementError
 
 from .input_signal import InputSignal, input_signals
 from .read import read_measurement
-from .table import DISK, PENDULUM, Measurement, check_length
+from .table import CAMERA_COLUMNS, DISK, PENDULUM, Measurement, check_length
 
 __all__ = [
+    "CAMERA_COLUMNS",
     "DISK",
     "PENDULUM",
     "InputSignal",

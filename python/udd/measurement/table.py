@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 
 DISK = ("Y", "Z", "beta")
 PENDULUM = ("theta",)
-QUALITY = ("marks", "complete", "residual_px", "blur_px", "method")  # what a tracked film says of each frame
+#: Motion of a film's camera: the place of the steady picture's corner in a frame [pixels], the frame's turn
+#: [rad] and enlargement, and its light relative to the steady picture.
+CAMERA_COLUMNS = ("camera_u", "camera_v", "camera_turn", "camera_zoom", "camera_gain")
+#: What a tracked film says of each frame.
+QUALITY = ("marks", "complete", "residual_px", "blur_px", "method", *CAMERA_COLUMNS)
 USABLE = ("gap", "degraded")  # flags of frames that hold what they show all the same
 SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
 
@@ -54,7 +58,8 @@ class Measurement:
     quality : mapping, optional
         What is known of how each row came about, by name (n,): of a tracked film ``marks`` (number seen),
         ``complete`` (share of the marks' edges in view), ``residual_px`` (r.m.s. misfit of the marks),
-        ``blur_px`` (length of the streaks) and ``method`` ("refined", "fast" or "none").
+        ``blur_px`` (length of the streaks) and ``method`` ("refined", "fast" or "none"); of a camera that
+        moved also ``camera_u, camera_v`` [pixels], ``camera_turn`` [rad], ``camera_zoom``, ``camera_gain``.
     inputs : mapping, optional
         Measured inputs (what drives it) by name: an :class:`udd.InputSignal` with a clock of its own, or an
         array (n,) of samples at `t`, joined by straight lines. Their units may stand in

@@ -192,7 +192,7 @@ def _composed(
     corner = np.array([[_PANEL / 2 / reach, 0.0, 0.0], [0.0, _PANEL / 2 / reach, 0.0]])
     corner[:, 2] = _PANEL / 2 - 0.5 - corner[:, :2] @ [u, v]
     drawn = [np.stack(list(_drawn(p, float(measurement.meta["R"]), len(t)))) for p in panels[1:]]
-    for k, picture in enumerate(pictures_between(film, t)):
+    for k, picture in enumerate(pictures_between(film, t, measurement)):
         cropped = cv2.warpAffine(
             picture, corner, (_PANEL, _PANEL), flags=cv2.INTER_AREA, borderValue=(246,) * 3
         )

@@ -196,7 +196,7 @@ def frames(discovery: Discovery, film: str | os.PathLike[str]) -> Image:
     chosen = rows[np.unique(np.linspace(0, min(len(rows) - 1, 60), _FRAMES).astype(int))]
     geometry = pixels(_fitted(discovery.fit))
     figure, grid = blank(2.6 * _FRAMES, 2.9, columns=_FRAMES, left=0.05, bottom=0.05, between=0.1)
-    for ax, picture, row in zip(grid[0], pictures_between(film, m.t[chosen]), chosen, strict=False):
+    for ax, picture, row in zip(grid[0], pictures_between(film, m.t[chosen], m), chosen, strict=False):
         plot.overlay(picture, geometry, int(row), ax)
         _look_at(geometry, picture.shape, ax)
         ax.set_axis_off()

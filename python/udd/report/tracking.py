@@ -261,7 +261,7 @@ def frames(video: str | os.PathLike[str], m: Measurement) -> tuple[Figure, ...]:
 
     where, pick = pixels(m), chosen(m)
     out = []
-    for image, (k, why) in zip(pictures_at(video, [k for k, _ in pick]), pick, strict=True):
+    for image, (k, why) in zip(pictures_at(video, [k for k, _ in pick], m), pick, strict=True):
         drawn = np.ascontiguousarray(image)
         draw(drawn, where, k, "")
         factor = WIDTH * 2 / drawn.shape[1]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
+from udd.tracking.correction import correction_of
 from udd.tracking.metric.pixels_to_metres import Pixels, pixels
 from udd.video.reader import Film
 from udd.video.rgb_frames import rgb
@@ -48,6 +49,7 @@ def overlay(video: str | os.PathLike[str], measurement: Measurement, path: str |
     if "px_per_m" not in measurement.meta:
         raise ValueError("the measurement was not tracked in a film, so there is nothing to draw")
     film = Film(video)
+    film.correct = correction_of(measurement.meta, measurement.quality, film.full_range)
     target = checked_path(path)
     frames = _drawn(film, measurement, pixels(measurement))
     first = next(frames)

@@ -20,10 +20,11 @@ from udd.tracking.calibration.config import Config, read_options
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.calibration.rim import Rim, outline
 from udd.tracking.calibration.scale import scale as size_of
-from udd.tracking.detection.colour_blobs import COLOURS, FEWEST, sightings
-from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost
-from udd.tracking.detection.layout_matching import sightings as matching
-from udd.tracking.detection.survey import Survey, slowest, survey
+from udd.tracking.correction import Correction, applied, correction_of
+from udd.tracking.detection.camera_motion import CameraMotion, camera_motion
+from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost, lost
+from udd.tracking.detection.recognition import recognise
+from udd.tracking.detection.survey import Survey, survey
 from udd.tracking.geometry.pose import DiskAppearance, Pose
 from udd.tracking.metric.calibration_report import camera_of, meta_of
 from udd.tracking.metric.common_errors import common_mode_errors
@@ -214,8 +215,10 @@ def _bar(film: Film, frames: int, verb: str, progress: bool) -> Any:
 
 def _track_marks(film: Film, options: TrackOptions, progress: bool, watch: Watch | None) -> Tracking:
     """Coloured marks: survey, calibrate, follow, refine, to metres, flags."""
-    look_over = survey(film)
-    known, rim = _calibrate(film, look_over, options)
+    look_over, camera = _steadied(film)
+    there = recognise(film, look_over, options)
+    look_over, options = there.look_over, there.options
+    known, rim = prepare(film, look_over, there.sights, there.seen, options, there.clear)
     tracks = _follow(film, known, look_over.frames, progress, watch)
     # where the contact was known the paths were curved, and poses stand in their middle
     tracks, doubtful = _unwrap(tracks, known.exposure if known.contact is None else 0.0)
@@ -223,7 +226,19 @@ def _track_marks(film: Film, options: TrackOptions, progress: bool, watch: Watch
         known = recalibrate(known, look_over, tracks, options)
         tracks = _refine(film, known, tracks, progress)
     tracks = drop_weak(tracks)
-    return _to_metres(film, tracks, known, options, rim, doubtful, options.refine, look_over)
+    return _to_metres(film, tracks, known, options, rim, doubtful, options.refine, look_over, camera)
+
+
+def _steadied(film: Film) -> tuple[Survey, CameraMotion | None]:
+    """Look over the film; a camera's motion, zoom and steps of exposure are undone from here on."""
+    look_over = survey(film)
+    camera = camera_motion(film, look_over)
+    if camera is None:
+        return look_over, None
+    correct = camera.correction(Correction(full_range=film.full_range))
+    film.correct = correct
+    warnings.warn(f"{film.path}: {camera.text}", stacklevel=outside())
+    return replace(look_over, bursts=[[correct(p) for p in burst] for burst in look_over.bursts]), camera
 
 
 def _track_tags(film: Film, options: TrackOptions, progress: bool, watch: Watch | None) -> Tracking:
@@ -258,27 +273,6 @@ def _unwrap(tracks: Tracks, open_for: float) -> tuple[Tracks, int]:
     return replace(tracks, centre=centre, angle=angle), doubtful
 
 
-def _calibrate(film: Film, look_over: Survey, options: TrackOptions) -> tuple[TrackerState, Rim | None]:
-    """Find the disk in the survey, and learn all that is needed to follow it."""
-    inside = [options.inside(p) for p in look_over.pictures]
-    missing, what = None, "red, orange, blue and green (clockwise)"
-    if options.layout.standard:
-        sights, missing = sightings(inside)
-    else:
-        sights, what = matching(inside, options.layout, options.scale), "the layout's colours"
-    seen = slowest(look_over.bursts, sights)
-    if len(seen) < FEWEST:
-        raise TrackError(
-            f"{film.path}: no disk with marks in {what} was found: "
-            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all {len(options.layout.places)}"
-        )
-    if missing is not None:
-        warnings.warn(
-            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=outside()
-        )
-    return prepare(film, look_over, sights, seen, options)
-
-
 @dataclass(frozen=True)
 class _Upright:
     """Poses of a disk that stays in its plane, and what they have in common."""
@@ -300,8 +294,12 @@ def _to_metres(
     doubtful: int,
     twice: bool,
     look_over: Survey | None = None,
+    moved: CameraMotion | None = None,
 ) -> Tracking:
     """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
+    if moved is not None and not moved.steady:
+        why = lost("the background is not seen, and the camera moves")
+        tracks = tracks.without(~moved.known[: len(tracks)], why)
     disk = _upright(film, tracks, known, options, rim, twice, look_over)
     tracks, camera = disk.tracks, disk.camera
     # where the layout is taken as said, so is the centre
@@ -309,6 +307,8 @@ def _to_metres(
     centre_sigma = by_hand * camera.scale
     if disk.rim is not None and options.calibrate.layout:
         centre_sigma = disk.rim.centre_sigma
+    if moved is not None and not moved.steady:
+        disk = replace(disk, shared=[*disk.shared, *moved.errors(tracks.centre)])
     own = to_mid_exposure(tracks, covariance(tracks, disk.known.look), disk.known.exposure**2 / 12)
     alike = common_mode_errors(tracks, add_shared_errors(own, 0.0, disk.shared), camera)
     shared = [*disk.shared, *(alike[:, None] * np.eye(3)[axis] for axis in (0, 1))]  # u and v: two causes
@@ -323,6 +323,11 @@ def _to_metres(
     tracks = replace(tracks, flag=tuple(flags))
     meta = meta_of(film, tracks, disk.known, camera, options, doubtful, disk.wobble)
     seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
+    correct = applied(film)
+    meta |= correct.meta
+    seen_how |= {name: column[: len(tracks)] for name, column in correct.columns.items()}
+    if moved is not None:
+        meta |= moved.meta
     tracks = replace(tracks, flag=tuple(remarks(tracks.t, tracks.flag, seen_how, twice)))
     m = Measurement(tracks.t, values, sigma, rho, np.array(tracks.flag), meta, DISK, seen_how)
     try:
@@ -396,11 +401,17 @@ def _refine(film: Film, known: TrackerState, tracks: Tracks, progress: bool) -> 
     return tracks
 
 
-def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[NDArray[np.uint8]]:
-    """Frames of a film by their number, as RGB arrays (height, width, 3), for drawing upon."""
+def pictures_at(
+    video: str | os.PathLike[str], frames: Sequence[int], tracked: Measurement | None = None
+) -> list[NDArray[np.uint8]]:
+    """Frames of a film by their number, as RGB arrays (height, width, 3), for drawing upon.
+
+    With `tracked`, what `udd.track` made of the film, they are corrected as they were for it: steadied,
+    turned upright.
+    """
     wanted = {int(i) for i in frames}
     found: dict[int, NDArray[np.uint8]] = {}
-    film = Film(video)
+    film = _as_tracked(video, tracked)
     for picture in film.pictures():
         if picture.index in wanted:
             found[picture.index] = rgb(picture, film.full_range)
@@ -412,12 +423,26 @@ def pictures_at(video: str | os.PathLike[str], frames: Sequence[int]) -> list[ND
     return [found[int(i)] for i in frames]
 
 
-def pictures_between(video: str | os.PathLike[str], t: NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
-    """The frames nearest to increasing times, as RGB arrays; what comes long before them is not decoded."""
-    film, wanted = Film(video), iter(t.tolist())
+def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> Film:
+    """A film whose pictures are those in which places were measured."""
+    film = Film(video)
+    if tracked is not None:
+        film.correct = correction_of(tracked.meta, tracked.quality, film.full_range)
+    return film
+
+
+def pictures_between(
+    video: str | os.PathLike[str], t: NDArray[np.float64], tracked: Measurement | None = None
+) -> Iterator[NDArray[np.uint8]]:
+    """The frames nearest to increasing times, as RGB arrays, corrected as for `tracked` if that is given.
+
+    What comes long before them is not decoded.
+    """
+    film, wanted = _as_tracked(video, tracked), iter(t.tolist())
     want = next(wanted, None)
     before: Picture | None = None
-    for picture in film.pictures(float(t[0])):
+    # a camera's motion is known by the frames' numbers, which count from where decoding begins
+    for picture in film.pictures(float(t[0]) if film.correct is None else 0.0):
         while want is not None and before is not None and picture.t > want:
             nearest = before if want - before.t < picture.t - want else picture
             yield rgb(nearest, film.full_range)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -90,6 +90,7 @@ class Film:
         self.fps = float(fps or said["fps"] or (1 / self.clock.period if self.clock else math.nan))
         self.full_range = bool(said["full_range"])
         self.light = light_of_codes(self.full_range)  # of each brightness code
+        self.correct: Callable[[Picture], Picture] | None = None  # what is done to each picture
 
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
         """All frames that decode, in order of presentation, with increasing times.
@@ -110,7 +111,7 @@ class Film:
                 elif self.clock is not None:
                     # The halves of interlaced frames are half a period apart.
                     picture = replace(picture, t=self.clock.at(picture.t, parts=2))
-                yield picture
+                yield picture if self.correct is None else self.correct(picture)
             self.broken = decoder.broken
         finally:
             if decoder.whole:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -140,14 +141,17 @@ def _sight(centre: complex, arm: complex, mark: int, area: NDArray[np.float64]) 
     return Sight(centre, angle, abs(arm), float(area.mean()))
 
 
-def sightings(pictures: list[Picture]) -> tuple[list[Sight | None], int | None]:
+def sightings(
+    pictures: list[Picture], choose: Callable[[list[list[Blobs]]], list[list[Blobs]]] = lambda every: every
+) -> tuple[list[Sight | None], int | None]:
     """The disk in each picture where its marks can be told, None elsewhere; and the mark that is missing.
 
-    Strong colours are looked for first, then faded ones, then three marks instead of four.
+    Strong colours are looked for first, then faded ones, then three marks instead of four. `choose` picks the
+    patches that may be marks.
     """
     best: tuple[list[Sight | None], int | None] = ([None] * len(pictures), None)
     for chroma in (LEAST_CHROMA, FADED):
-        patches = [coloured(p, chroma) for p in pictures]
+        patches = choose([coloured(p, chroma) for p in pictures])
         for without in (None, 0, 1, 2, 3):
             sights = agreeing([squares(p, without) for p in patches])
             if _count(sights) > (1 if without is None else 2) * max(_count(best[0]), FEWEST - 1):

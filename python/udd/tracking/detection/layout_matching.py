@@ -11,24 +11,26 @@ from udd.markers.layout import SLACK, Layout, laid, same_colour
 from udd.video.reader import Picture
 
 from .colour_blobs import LEAST_CHROMA, Blobs, Sight, agreeing, blobs
+from .still_patches import split
 
 HUE = 0.87  # the same between a pixel and its mark
-STILL = 0.7  # share of the survey in which a patch that stands still is none of the marks
-STANDS = 1.5  # pixels by which it may seem to move
 SMALLEST, LARGEST = 0.015, 0.6  # side of a mark against the marks' reach
 MOST = 40  # ways to see the disk in one picture that are kept
 
 
-def sightings(pictures: Sequence[Picture], layout: Layout, scale: float | None = None) -> list[Sight | None]:
+def sightings(
+    pictures: Sequence[Picture], layout: Layout, scale: float | None = None, still: bool | None = None
+) -> list[Sight | None]:
     """The disk in each picture that shows all its marks (or, of four and more, all but one).
 
-    `scale` [pixels per metre] helps where little else tells marks from patches of the same colours.
+    `scale` [pixels per metre] helps where little else tells marks from patches of the same colours. `still`:
+    of patches that stand still alone, or of those that do not; if not given, of those, else of all.
     """
     patches = [coloured(p, layout) for p in pictures]
-    moving = _without_still(patches)
+    chosen = [split(patches, bool(still)), *([patches] if still is None else [])]
     n = len(layout.places)
     best: list[Sight | None] = [None] * len(pictures)
-    for found in (moving, patches):
+    for found in chosen:
         for least in range(n, max(n - 2, min(n, 3) - 1), -1):
             sights = agreeing([matches(p, layout, least, scale) for p in found])
             if sum(s is not None for s in sights) > 2 * sum(s is not None for s in best):
@@ -52,22 +54,6 @@ def coloured(picture: Picture, layout: Layout) -> list[Blobs]:
 def _merged(along: NDArray[np.float32], layout: Layout) -> list[NDArray[np.float32]]:
     """For each mark how far a pixel goes along its colour, or that of any mark with the same one."""
     return [along[row].max(axis=0) for row in same_colour(layout.chroma)]
-
-
-def _without_still(patches: list[list[Blobs]]) -> list[list[Blobs]]:
-    """Without those that are in the same place in most pictures."""
-    out = [list(p) for p in patches]
-    for k in range(len(patches[0]) if patches else 0):
-        everywhere = [p[k].centre for p in patches]
-        for row, p in zip(out, patches, strict=True):
-            here = p[k].centre
-            count = np.zeros(len(here))
-            for other in everywhere:
-                if len(other) and len(here):
-                    count += np.abs(here[:, None] - other[None, :]).min(axis=1) < STANDS
-            keep = count < STILL * len(patches)
-            row[k] = Blobs(here[keep], p[k].area[keep])
-    return out
 
 
 def matches(

@@ -48,8 +48,11 @@ def prepare(
     sights: list[Sight | None],
     seen: list[tuple[Picture, Sight]],
     options: TrackOptions,
+    clear: NDArray[np.bool_] | None = None,
 ) -> tuple[TrackerState, Rim | None]:
     """Learn from the survey's pictures, in which the disk was found at `sights` (`seen`: slowest first).
+
+    `clear` is False where something looks like the disk's marks but is not.
 
     Raises
     ------
@@ -60,6 +63,8 @@ def prepare(
     fixed = None if wanted.layout else body
     view, white = visible(seen, body)
     view = view & options.view(view.shape)
+    if clear is not None:
+        view &= clear
     look = first_look(seen, view, white, film.light, body)
     colours = colours_of([p for p, _ in seen], [Pose(s.centre, s.angle) for _, s in seen], look, view)
     even = evenness(seen, view, body, film.light)

@@ -65,6 +65,15 @@ class Tracks:
         """Frames with a pose."""
         return np.asarray(np.isfinite(self.information).all(axis=(1, 2)))
 
+    def without(self, those: NDArray[np.bool_], flag: str) -> Tracks:
+        """The same without the poses of some frames (n,), which get a flag if they have none."""
+        changed = {
+            k: lost_in(float(self.t[k]), flag, float(self.streak[k]), self.chi2.shape[1])
+            for k in map(int, np.flatnonzero(those))
+            if not self.flag[k]
+        }
+        return self.with_frames(changed) if changed else self
+
     def with_frames(self, changed: Mapping[int, FrameTrack]) -> Tracks:
         """The same with other frames at those numbers."""
         columns = {f.name: list(getattr(self, f.name)) for f in fields(self)}

@@ -1,0 +1,326 @@
+"""How the camera moved, zoomed and changed its exposure: from what stands still about the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.tracking.correction import Correction
+from udd.video.reader import Film, Picture, Plane
+
+from .frame_flags import unusable
+from .survey import Survey
+
+Array = NDArray[np.float64]
+POINTS = 300  # of a picture that are tried
+LEARNED = 60  # pictures that show which of them belong to the background
+OFTEN = 0.35  # share of these in which such a point goes with the others
+FEWEST = 10  # points that must go the same way
+SHARE = 0.25  # of all that can be followed that must
+BACK = 0.7  # pixels by which a point may come back elsewhere when it is followed back
+OFF = 0.7  # pixels by which a point may miss the common motion
+STEADY = 0.2  # pixels: a camera that moves less is at rest
+AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
+PATCH = 5  # pixels about a point whose light is compared
+WINDOW = 15  # pixels
+UNSURE = 0.06  # pixels: a view known no better is none
+UNLIKE = 0.03  # relative difference of light that is evened out before points are followed
+ZOOMS = tuple(1.12**k for k in (1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6))  # that are tried if all else fails
+MOST_FAILED = 5  # pictures in a row after which other zooms are tried in every ...
+SELDOM = 20  # ... so many pictures only
+
+
+@dataclass(frozen=True)
+class CameraMotion:
+    """The view of each frame: a point z of the first picture lies at ``factor z + shift``; its light; errors.
+
+    NaN where the background was not seen. `sigma` (n, 3): of u and v at `middle` [pixels], and of the turn.
+    """
+
+    factor: NDArray[np.complex128]
+    shift: NDArray[np.complex128]
+    gain: Array
+    sigma: Array
+    middle: complex
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Frames whose background was seen."""
+        return np.asarray(np.isfinite(self.shift))
+
+    @property
+    def moved(self) -> NDArray[np.complex128]:
+        """How far the picture's middle is from its median place in each frame [pixels]."""
+        away = self.factor * self.middle + self.shift - self.middle
+        return np.asarray(away - complex(np.nanmedian(away.real), np.nanmedian(away.imag)))
+
+    @property
+    def turned(self) -> Array:
+        """How far half the picture's diagonal moves by turning and zooming [pixels]."""
+        away = self.factor / np.nanmedian(np.abs(self.factor))
+        return np.asarray(np.abs(away - complex(np.nanmedian(away.real), np.nanmedian(away.imag))))
+
+    @property
+    def rms(self) -> float:
+        """Motion of the picture's middle [pixels r.m.s.]."""
+        return float(np.sqrt(np.nanmean(np.abs(self.moved) ** 2)))
+
+    @property
+    def steady(self) -> bool:
+        """Whether the camera was at rest."""
+        if not self.known.any():
+            return True
+        away = np.abs(self.moved) + self.turned * abs(self.middle)
+        return bool(np.nanquantile(away, 0.99) < STEADY)
+
+    @property
+    def as_bright(self) -> bool:
+        """Whether the light stays nearly the same."""
+        return not self.known.any() or bool(np.nanmax(np.abs(self.gain - 1)) < AS_BRIGHT)
+
+    @property
+    def text(self) -> str:
+        """A sentence about what the camera did."""
+        said = []
+        if not self.steady:
+            zoom = 100 * (np.nanmax(np.abs(self.factor)) / np.nanmin(np.abs(self.factor)) - 1)
+            if zoom < 1 or self.rms > STEADY:
+                said.append(f"the camera moved, by {self.rms:.2g} pixels r.m.s.")
+            if zoom >= 1:
+                said.append(f"the camera zoomed, by {zoom:.0f} %")
+        if not self.as_bright:
+            ratio = np.nanmax(self.gain) / np.nanmin(self.gain)
+            said.append(f"the light of the pictures changes by a factor of {ratio:.2f}")
+        lost = int((~self.known).sum())
+        rest = f", but for {lost} frames without a background" if lost and not self.steady else ""
+        return f"{' and '.join(said)}: what stands still about the disk shows it, and it is undone{rest}"
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """Entries of the measurement's header."""
+        if self.steady:
+            return {}
+        place = float(np.nanmedian(self.sigma[:, 0]))
+        return {"camera_moved_px": round(self.rms, 4), "camera_sigma_px": round(place, 4)}
+
+    def correction(self, before: Correction) -> Correction:
+        """Return what steadies the pictures; frames without a known view keep the last one."""
+        last = np.maximum.accumulate(np.where(self.known, np.arange(len(self.shift)), 0))
+        none, full = np.empty(0, np.complex128), before.full_range
+        factor, shift = (none, none) if self.steady else (self.factor[last], self.shift[last])
+        gain = np.empty(0) if self.as_bright else self.gain[last]
+        return Correction(before.turns, before.mirrored, factor, shift, gain, full)
+
+    def errors(self, at: NDArray[np.complex128]) -> list[Array]:
+        """Standard errors (n, 3) of u, v and beta of a disk at these places, one array for each cause."""
+        arm = at - self.middle
+        u, v, turn = np.nan_to_num(self.sigma[: len(at)]).T
+        return [
+            np.column_stack([u, 0 * turn, 0 * turn]),
+            np.column_stack([0 * turn, v, 0 * turn]),
+            np.column_stack([-arm.imag * turn, arm.real * turn, turn]),
+            np.column_stack([arm.real * turn, arm.imag * turn, 0 * turn]),
+        ]
+
+
+def _about_median(motion: CameraMotion) -> CameraMotion:
+    """The same motion against the camera's usual view: the first one's roll is no better than another's."""
+    if not motion.known.any():
+        return motion
+    factor, middle = motion.factor, motion.middle
+    usual = complex(np.nanmedian(factor.real), np.nanmedian(factor.imag))
+    there = factor * middle + motion.shift
+    back = (middle - complex(np.nanmedian(there.real), np.nanmedian(there.imag))) / usual
+    gain = motion.gain / np.nanmedian(motion.gain)
+    return replace(
+        motion,
+        factor=factor / usual,
+        shift=motion.shift + factor * (middle + back - middle / usual),
+        gain=gain,
+    )
+
+
+NOWHERE = (complex(np.nan, np.nan), complex(np.nan, np.nan), np.nan, (np.nan, np.nan, np.nan))
+LEAST = 0.01  # pixels: no point is followed better
+Row = tuple[complex, complex, float, tuple[float, float, float]]  # of one frame: as the fields of the motion
+
+
+def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
+    """Return how the camera moved; None if it was at rest, or if nothing about the disk shows it.
+
+    Pictures of the survey decide which points belong to the background, and whether they move at all; only
+    then are they followed through the film.
+    """
+    whole = [p for p in look_over.pictures if not unusable(p)]
+    if not whole:
+        return None
+    background = Background(whole[0].y, film.light)
+    if not background.learned(whole):
+        return None
+    seen = background.follow(whole)
+    if not seen.known.any() or (seen.steady and seen.as_bright):
+        return None
+    return background.follow(film.pictures())
+
+
+class _Seen(NamedTuple):
+    """A frame's row, the points that show it, and the misfit of each [pixels]."""
+
+    row: Row
+    used: NDArray[np.intp]
+    rest: NDArray[np.complex128]
+
+
+class Background:
+    """Points about the disk that stand still, followed from one picture into others."""
+
+    def __init__(self, first: Plane, light: Array) -> None:
+        import cv2
+
+        self.light, self.first = light.astype(np.float32), first
+        height, width = first.shape
+        self.middle = complex(width - 1, height - 1) / 2
+        apart = max(5, round((height * width / 8000) ** 0.5))
+        found = cv2.goodFeaturesToTrack(first, POINTS, 0.005, apart, blockSize=5)
+        self._use(np.asarray([] if found is None else found, np.float32).reshape(-1, 2))
+        self.view = (1 + 0j, 0j)  # the last that is known
+        self.failed = 0  # pictures in a row whose view was not found
+
+    def _use(self, points: NDArray[np.float32], spread: Array | None = None) -> None:
+        self.points, self.bright = points, self._light(self.first, points)
+        self.spread = np.ones(len(points)) if spread is None else spread  # of each one's place [pixels]
+
+    def learned(self, pictures: Sequence[Picture]) -> bool:
+        """Keep the points that go with most others in most pictures; False if there are too few."""
+        votes, squares, known = np.zeros(len(self.points)), np.zeros(len(self.points)), 0
+        for picture in pictures[:: max(1, len(pictures) // LEARNED)]:
+            found = self._seen(picture.y)
+            if found is not None:
+                known += 1
+                votes[found.used] += 1
+                squares[found.used] += np.abs(found.rest) ** 2
+        keep = votes > OFTEN * max(known, 1)
+        self._use(self.points[keep], np.sqrt(squares[keep] / votes[keep] + LEAST**2))
+        self.view = (1 + 0j, 0j)
+        return len(self.points) >= FEWEST
+
+    def follow(self, pictures: Iterable[Picture]) -> CameraMotion:
+        """Return the view of each picture."""
+        rows: list[Row] = []
+        for picture in pictures:
+            found = None if unusable(picture) else self._seen(picture.y)
+            rows.append(NOWHERE if found is None else found.row)
+        factor, shift, gain, sigma = zip(*rows, strict=True)
+        return _about_median(
+            CameraMotion(np.array(factor), np.array(shift), np.array(gain), np.array(sigma), self.middle)
+        )
+
+    def _seen(self, y: Plane) -> _Seen | None:
+        """One picture's view, and the points that show it; None where too few agree."""
+        for factor, shift, steadied in self._guesses(y):
+            found = self._follow(steadied)
+            if found is None:
+                continue
+            used, there = found
+            more, away, rest, sigma = _similar(
+                self.points[used].astype(float) @ [1, 1j],
+                there.astype(float) @ [1, 1j],
+                self.spread[used],
+                self.middle,
+            )
+            if sigma[0] > UNSURE:
+                continue
+            self.view, self.failed = (factor * more, factor * away + shift), 0
+            seen = self._light(_seen_from(y, *self.view), self.points[used])
+            gain = float(np.median(seen / np.maximum(self.bright[used], 1.0)))
+            return _Seen((*self.view, gain, sigma), used, rest)
+        self.failed += 1
+        return None
+
+    def _guesses(self, y: Plane) -> Iterator[tuple[complex, complex, Plane]]:
+        """Views to start from, and the picture as it would be from the first one's, about as bright."""
+        y = _as_light(y, float(np.median(self.first[::4, ::4])) / max(float(np.median(y[::4, ::4])), 1.0))
+        factor, shift = self.view
+        yield factor, shift, _seen_from(y, factor, shift)
+        if abs(factor - 1) + abs(shift) > 0.5:
+            yield 1 + 0j, 0j, y
+        if self.failed < MOST_FAILED or self.failed % SELDOM == 0:
+            for zoom in ZOOMS:
+                more = factor * zoom, shift + factor * self.middle * (1 - zoom)
+                yield *more, _seen_from(y, *more)
+
+    def _follow(self, y: Plane) -> tuple[NDArray[np.intp], NDArray[np.float32]] | None:
+        """Points that go the same way from the first picture into this one, and where they are in it."""
+        import cv2
+
+        how = {"winSize": (WINDOW, WINDOW), "maxLevel": 3}
+        there, ok, _ = cv2.calcOpticalFlowPyrLK(self.first, y, self.points, None, **how)  # type: ignore[call-overload]
+        back, ok_back, _ = cv2.calcOpticalFlowPyrLK(y, self.first, there, None, **how)  # type: ignore[call-overload]
+        good = (ok.ravel() > 0) & (ok_back.ravel() > 0)
+        good &= np.abs(back - self.points).max(axis=1) < BACK
+        if good.sum() < FEWEST:
+            return None
+        rows = np.flatnonzero(good)
+        _, agree = cv2.estimateAffinePartial2D(
+            self.points[rows], there[rows], method=cv2.RANSAC, ransacReprojThreshold=OFF, maxIters=500
+        )
+        if agree is None or agree.sum() < max(FEWEST, SHARE * good.sum()):
+            return None
+        used = rows[agree.ravel() > 0]
+        return used, there[used]
+
+    def _light(self, y: Plane, points: NDArray[np.float32]) -> Array:
+        """Mean light about points."""
+        import cv2
+
+        mean = cv2.blur(cv2.LUT(y, self.light), (PATCH, PATCH))
+        column, row = np.round(points).astype(int).T
+        return np.asarray(mean[np.clip(row, 0, y.shape[0] - 1), np.clip(column, 0, y.shape[1] - 1)], float)
+
+
+def _as_light(y: Plane, ratio: float) -> Plane:
+    """The picture with its codes multiplied, unless that hardly changes it."""
+    import cv2
+
+    if abs(ratio - 1) < UNLIKE:
+        return y
+    return np.asarray(cv2.convertScaleAbs(y, alpha=ratio), np.uint8)
+
+
+def _seen_from(y: Plane, factor: complex, shift: complex) -> Plane:
+    """The picture as the first one's camera would have taken it."""
+    import cv2
+
+    if factor == 1 and shift == 0:
+        return y
+    view = np.array([[factor.real, -factor.imag, shift.real], [factor.imag, factor.real, shift.imag]])
+    size, how = (y.shape[1], y.shape[0]), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    seen = cv2.warpAffine(y, view, size, flags=how, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(seen, np.uint8)
+
+
+def _similar(
+    body: NDArray[np.complex128], seen: NDArray[np.complex128], spread: Array, middle: complex
+) -> tuple[complex, complex, NDArray[np.complex128], tuple[float, float, float]]:
+    """Least squares of a turn, a factor and a shift, points that are off by more than usual counting less.
+
+    Returns these, what is left at each point, and standard errors of u and v at `middle` and of the turn.
+    """
+    weight = spread**-2.0
+    for _ in range(4):
+        centre = (weight @ body) / weight.sum()
+        arm = body - centre
+        square = float(weight @ np.abs(arm) ** 2)
+        factor = complex((weight * arm.conj()) @ (seen - (weight @ seen) / weight.sum())) / square
+        shift = complex((weight @ seen) / weight.sum() - factor * centre)
+        rest = seen - factor * body - shift
+        off = np.abs(rest) / spread
+        usual = float(np.median(off)) / 1.18  # of two normal coordinates
+        weight = spread**-2.0 / (1 + (off / (3 * max(usual, 1e-9))) ** 2)
+    turn = usual / np.sqrt(square)
+    place = float(np.hypot(usual / np.sqrt(weight.sum()), turn * abs(middle - centre)))
+    return factor, shift, rest, (place, place, float(turn))

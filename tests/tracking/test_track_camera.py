@@ -1,0 +1,98 @@
+"""Films by cameras that move, zoom or change their exposure, and films of more than the disk."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("av", reason="the tracker's extra is not installed")
+pytest.importorskip("cv2", reason="the tracker's extra is not installed")
+
+import udd
+from small_films import SMALL, shot
+from tracked_errors import errors, rms
+from udd.errors import UddError
+from udd.film import Defects
+from udd.measurement import read_measurement
+from udd.tracking import pictures_at, pixels
+
+COLOURS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
+MARKS = [{"at": [0.0, 0.06], "colour": "purple"}, {"at": [0.02, -0.055], "colour": "cyan"}]
+
+
+@pytest.mark.parametrize(
+    ("defects", "said"),
+    [
+        ({"shake": 8.0}, "the camera moved"),
+        ({"bumps": ((1.5, 9.0, -5.0), (2.5, 0.0, 0.0))}, "the camera moved"),
+        ({"zooms": ((1.5, 1.25),)}, "the camera zoomed, by 25 %"),
+        ({"gains": ((1.5, 0.7), (2.5, 1.0))}, "the light of the pictures changes"),
+    ],
+)
+def test_what_the_camera_does_is_undone_and_reported(defects: Any, said: str, tmp_path: Path) -> None:
+    film = shot(tmp_path / "moved.mp4", defects=Defects(**defects))
+    with pytest.warns(UserWarning, match=said):
+        m = udd.track(film.path)
+    e = rms(errors(m, film))
+    # a steady camera: 0.02 mm and 0.3 mrad; the motion is known to 0.02 pixels of 1.1 mm, about its mean
+    assert e[0] < 0.07 and e[1] < 0.07 and e[2] < 3 and m.seen.mean() > 0.96
+    m.to_csv(tmp_path / "moved.csv")
+    back = read_measurement(tmp_path / "moved.csv")
+    # drawn upon the film as it was measured, the marks lie on the marks
+    where, row = pixels(back), int(np.flatnonzero(back.seen)[-3])
+    picture = pictures_at(film.path, [row], back)[0].astype(int)
+    red, blue = (picture[tuple(np.round(where.marks[row, k][::-1]).astype(int))] for k in (0, 2))
+    assert red[0] > 2 * red[2] and blue[2] > 1.5 * blue[0]
+
+
+def test_a_steady_camera_is_left_alone(tmp_path: Path) -> None:
+    film = shot(tmp_path / "steady.mp4", defects=Defects(hands=((1.0, 1.6),)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        m = udd.track(film.path)
+    assert "camera_u" not in m.quality and "camera_moved_px" not in m.meta
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 1.6])
+def test_a_picture_of_the_device_is_not_tracked(size: float, tmp_path: Path) -> None:
+    view: Any = {"size": (560, 400), "scale": 875.0, "pivot": (400.0, 200.0)}
+    film = shot(tmp_path / "poster.mp4", 2.4, defects=Defects(poster=size), **view)
+    m = udd.track(film.path)
+    e = rms(errors(m, film))
+    assert e[0] < 0.05 and e[1] < 0.05 and e[2] < 1 and m.seen.all()
+
+
+def test_a_mirrored_film_is_turned_around(tmp_path: Path) -> None:
+    film = shot(tmp_path / "selfie.mp4", defects=Defects(mirrored=True))
+    with pytest.warns(UserWarning, match="mirrored"):
+        m = udd.track(film.path, pivot=(SMALL[0] - 1 - film.pivot[0], film.pivot[1]))
+    e = rms(errors(m, film))
+    assert e[0] < 0.05 and e[1] < 0.05 and e[2] < 1 and m.seen.all()
+    assert m.meta["mirrored"] and float(m.meta["pivot_u"]) == pytest.approx(film.pivot[0], abs=1e-6)
+
+
+def test_what_never_moves_is_refused_if_something_else_does(tmp_path: Path) -> None:
+    """Four squares on the wall, and a disk of two marks."""
+    wall = np.full((SMALL[1], SMALL[0], 3), 150.0)
+    for (du, dv), colour in zip(((0, -30), (30, 0), (0, 30), (-30, 0)), COLOURS, strict=True):
+        wall[300 + dv - 7 : 300 + dv + 7, 50 + du - 7 : 50 + du + 7] = colour
+    film = shot(tmp_path / "wall.mp4", background=wall, layout=MARKS)
+    with pytest.raises(UddError, match="never moves, but something else does"):
+        udd.track(film.path)
+    # said, the disk's own marks are tracked
+    e = rms(errors(udd.track(film.path, layout=MARKS, pivot=film.pivot), film))
+    assert e[0] < 0.2 and e[1] < 0.2
+
+
+def test_a_disk_at_rest_is_measured(tmp_path: Path) -> None:
+    class Rest:
+        t = np.arange(0, 2.4, 0.01)
+        state = np.tile([0.0, 0.001, -0.02, 0.4], (240, 1))
+
+    film = udd.render(Rest(), tmp_path / "rest.mp4", size=SMALL)
+    m = udd.track(film.path, pivot=film.pivot)
+    assert np.nanmax(np.abs(errors(m, film)[:, :2])) < 0.2
