@@ -1,8 +1,9 @@
-"""All equilibria of a model, by Powell's hybrid method from many starts."""
+"""Equilibria of a model: all isolated ones of polynomial laws, else those that a search finds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +17,12 @@ from udd._util.validation import array, whole
 from udd.errors import ModelError
 from udd.models import Model, require_model
 
+from .degenerate_roots import Law, degenerate_root
 from .equilibrium_curve import expansion
 from .flow_map import Floats, FlowMap, flow_of
+from .homotopy import bezout_number, complex_roots
 from .normal_forms import first_lyapunov_coefficient
+from .polynomials import Polynomials, numerators_of, taylor_at
 from .solutions import Equilibrium, FoundList, kind_of_rest
 
 __all__ = ["Equilibria", "equilibria", "equilibrium_at", "refined"]
@@ -28,6 +32,13 @@ _REST = 1e-9  # rates, in typical sizes per typical time, that are as good as no
 _REACHES = (0.3, 1.0, 3.0, 10.0)  # boxes in which the search starts, in typical sizes
 _ROUNDS = 8  # rounds of a search at most
 _WIDER = 1.25  # than what was found before is the box of a later round
+_ROUNDING = 1e-13  # of the typical size, below which a component may be rounding
+_MOST_PATHS = 600  # of a homotopy: some seconds
+_REAL = 1e-8  # relative: a root with smaller imaginary parts is real
+_EXACT = 1e-6  # typical sizes: nearer to where the derivatives are singular an equilibrium is degenerate
+_CLEAR = 1e-3  # a least singular value above this is not that of a degenerate equilibrium
+_ONE = 1e-2  # singular states nearer than this, in typical sizes, come from one equilibrium
+_MOST_SINGULAR = 16  # of them are looked at
 
 
 class Equilibria(FoundList[Equilibrium]):
@@ -47,7 +58,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
         States from which the search starts besides those that it chooses itself.
     initial_states : int
         From so many states each round of the search starts, at first spread over boxes of 0.3 to 10 times
-        the size of the motion.
+        the size of the motion. Not needed for laws of polynomials.
 
     Returns
     -------
@@ -63,12 +74,17 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
 
     Notes
     -----
-    Each start is refined by Powell's hybrid method with exact derivatives (`scipy.optimize.root`); the
-    result is kept if nothing moves there. Some starts are then refined again with the known equilibria
-    divided out of the rates (deflation). If that finds more, the search is repeated from as many states in
-    the box that the equilibria span, at most 7 times. The search is not exhaustive: it can miss an
-    equilibrium with a small basin of that method, or far outside the boxes: give a state `near` it. For the
-    DLE the rotating states are ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk
+    If the rates are polynomials, or quotients of polynomials, a homotopy follows as many paths as the
+    product of their degrees, the Bezout number, which end in all isolated equilibria (up to 600 paths). A
+    multiple root is refined by deflation. Of a curve or surface of equilibria the list has a point or two:
+    those at the states given as `near`, and those nearest to the origin.
+
+    For other laws each start is refined by Powell's hybrid method with exact derivatives
+    (`scipy.optimize.root`); the result is kept if nothing moves there. Some starts are then refined again
+    with the known equilibria divided out of the rates (deflation). If that finds more, the search is repeated
+    from as many states in the box that the equilibria span, at most 7 times. This search is not exhaustive.
+    It can miss an equilibrium with a small basin of that method, or far outside the boxes: give a state
+    `near` it. For the DLE the rotating states are ``omega = y = +-sqrt(w)``, ``z = 0``; for the disk
     ``Omega^2 = g W/k(Omega)``, ``Y = W/Omega``, where angles that nothing depends on go on turning.
 
     Examples
@@ -80,9 +96,11 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     [1.732051 1.732051 0.      ] saddle-focus
     [0. 0. 5.] saddle
 
-    A search that finds nothing says where it was:
+    The list says how it was made:
 
     >>> print(udd.equilibria(udd.Model(["x", "v"], ["v", "1 + x^2"])).search)
+    all isolated equilibria: a homotopy with 2 paths, the Bezout number
+    >>> print(udd.equilibria(udd.Model(["x", "v"], ["v", "exp(x)"])).search)
     Powell's method from 128 states within |x| <= 10, |v| <= 10: others may exist
     """
     require_model(model)
@@ -93,37 +111,140 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     count = max(whole("initial_states", initial_states, 1), len(_REACHES))
     require_memory(f"{count} initial states", count, 200 + 32 * dim, itemsize=1)
     flow = flow_of(model, given if len(given) else np.ones((1, dim)))
-    found = _search(flow, flow.reduced(given), count)
-    rests = [equilibrium_at(flow, flow.values, x) for x in found]
+    found = _Found(flow)
+    search = _all_of_polynomials(flow, found) or _some(flow, flow.reduced(given), count, found)
+    for x in flow.reduced(given):
+        if refined(flow, flow.values, x) is None:
+            found.add_degenerate(x, nearest=False)
+    rests = [equilibrium_at(flow, flow.values, x) for x in found.regular]
+    for x, isolated in found.degenerate:
+        kind = "degenerate" if isolated else "not isolated"
+        rests.append(replace(equilibrium_at(flow, flow.values, x), kind=kind, isolated=isolated))
     rests.sort(key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
-    names = [model.state_names[k] for k in flow.kept]
-    within = (f"|{n}| <= {_REACHES[-1] * s:.4g}" for n, s in zip(names, flow.size, strict=True))
-    given_too = f" and {len(given)} given" if len(given) else ""
-    search = f"Powell's method from {count} states within {', '.join(within)}{given_too}: others may exist"
+    sets = sum(not rest.isolated for rest in rests)
+    if sets:
+        search += f"; {sets} of the list not isolated, on a curve or surface of equilibria"
     return Equilibria(rests, search)
 
 
-def _search(flow: FlowMap, given: Floats, count: int) -> list[Floats]:
-    """The equilibria found from given states (n, r) and from rounds of `count` states each.
+class _Found:
+    """Reduced states of equilibria: regular ones, and degenerate ones with whether they are isolated."""
+
+    def __init__(self, flow: FlowMap) -> None:
+        self.flow = flow
+        self.regular: list[Floats] = []
+        self.degenerate: list[tuple[Floats, bool]] = []
+        self.law = _law_of(flow)
+
+    def add(self, x: Floats | None) -> bool:
+        """Note a regular equilibrium and its mirror image; whether it is new."""
+        new = False
+        for image in self._images(x):
+            if self._is_new(image):
+                self.regular.append(image)
+                new = True
+        return new
+
+    def add_degenerate(self, x: Floats, nearest: bool = True) -> None:
+        """Note the degenerate equilibrium near a state, if there is one."""
+        size = self.flow.size
+        try:
+            root = degenerate_root(self.law, x / size, nearest)
+        except (ModelError, ValueError, np.linalg.LinAlgError):
+            return
+        if root is None:
+            return
+        for image in self._images(root[0] * size):
+            if self._is_new(image):
+                self.degenerate.append((image, root[1]))
+
+    def _images(self, x: Floats | None) -> list[Floats]:
+        flow, images = self.flow, []
+        for image in () if x is None else (x,) if flow.mirror is None else (x, flow.mirror * x):
+            images.append(_without_rounding(flow, image + flow.turns(image)))
+        return images
+
+    def _is_new(self, x: Floats) -> bool:
+        known = [*self.regular, *(y for y, _ in self.degenerate)]
+        return all(_apart(self.flow, x, other) for other in known)
+
+
+def _without_rounding(flow: FlowMap, x: Floats) -> Floats:
+    """The state with components that are nothing but rounding replaced by 0."""
+    small = np.abs(x) < _ROUNDING * flow.size
+    if not small.any() or (x[small] == 0.0).all():
+        return x + 0.0
+    zero = np.where(small, 0.0, x)
+    before, after = (np.abs(flow.model.rates(0.0, flow.full(y))[flow.kept]) for y in (x, zero))
+    rounding = _ROUNDING * np.abs(expansion(flow, flow.values, x).by_state) @ flow.size
+    return zero if (after <= before + rounding).all() else x + 0.0
+
+
+def _law_of(flow: FlowMap) -> Law:
+    """Scaled rates about a scaled state, as polynomials of the scaled distance from it."""
+    exact = numerators_of(flow)
+    if exact is not None and (exact[1].degrees == 0).all():
+        system = exact[0].scaled(flow.size)
+        return system.shifted
+    unit = flow.clock / flow.size
+
+    def law(y: Floats) -> Polynomials:
+        own = taylor_at(flow, flow.values, y * flow.size)
+        table = own.coefficients * unit[:, None] * np.prod(flow.size**own.exponents, axis=1)
+        return Polynomials(own.exponents, table)
+
+    return law
+
+
+def _all_of_polynomials(flow: FlowMap, found: _Found) -> str:
+    """Find all isolated equilibria of a law of polynomials or their quotients; say how, or "" for others."""
+    fractions = numerators_of(flow)
+    if fractions is None:
+        return ""
+    system = fractions[0].scaled(flow.size)
+    paths = bezout_number(system)
+    if not 1 <= paths <= _MOST_PATHS or flow.dim == 0:
+        return ""
+    roots = complex_roots(system)
+    if roots.lost:
+        return ""
+    for root in roots.simple:
+        if np.abs(root.imag).max() < _REAL * (1.0 + np.abs(root).max()):
+            x = root.real * flow.size
+            if _defined(fractions[1], x):
+                found.add(refined(flow, flow.values, x))
+    for end in roots.multiple:
+        if _defined(fractions[1], end.real * flow.size):
+            found.add_degenerate(end.real * flow.size)
+    return f"all isolated equilibria: a homotopy with {paths} paths, the Bezout number"
+
+
+def _defined(below: Polynomials, x: Floats) -> bool:
+    """Whether no denominator vanishes at a state."""
+    return bool((np.abs(below.values(x)) > _REST * below.sizes(x)).all())
+
+
+def _some(flow: FlowMap, given: Floats, count: int, found: _Found) -> str:
+    """Find equilibria from many states; say how."""
+    _search(flow, given, count, found)
+    names = [flow.model.state_names[k] for k in flow.kept]
+    within = (f"|{n}| <= {_REACHES[-1] * s:.4g}" for n, s in zip(names, flow.size, strict=True))
+    given_too = f" and {len(given)} given" if len(given) else ""
+    return f"Powell's method from {count} states within {', '.join(within)}{given_too}: others may exist"
+
+
+def _search(flow: FlowMap, given: Floats, count: int, found: _Found) -> None:
+    """Find equilibria from given states (n, r) and from rounds of `count` states each.
 
     A round is followed by another in the box of what was found, as long as it finds something new within
     the boxes of the first.
     """
-    found: list[Floats] = []
-
-    def add(x: Floats | None) -> bool:
-        new = False
-        for image in () if x is None else (x,) if flow.mirror is None else (x, flow.mirror * x):
-            image = image + flow.turns(image)
-            if all(_apart(flow, image, known) for known in found):
-                found.append(image + 0.0)
-                new = True
-        return new
 
     def inside() -> list[Floats]:
-        return [x for x in found if (np.abs(x) <= _REACHES[-1] * flow.size).all()]
+        return [x for x in found.regular if _within(flow, x)]
 
     points, guesses = qmc.Sobol(flow.dim, seed=3), [*given]
+    singular: list[Floats] = []
     for number in range(_ROUNDS):
         box = 2.0 * points.random(count) - 1.0
         if number == 0:
@@ -133,14 +254,28 @@ def _search(flow: FlowMap, given: Floats, count: int) -> list[Floats]:
             low, high = np.min(inside(), axis=0), np.max(inside(), axis=0)
             guesses = [*(0.5 * (low + high) + box * _WIDER * np.maximum(0.5 * (high - low), flow.size))]
         for guess in guesses:
-            add(refined(flow, flow.values, guess))
+            x, regular = _rest_from(flow, flow.values, guess)
+            if regular:
+                found.add(x)
+            elif (
+                x is not None
+                and _within(flow, x)
+                and all(np.abs((x - y) / flow.size).max() > _ONE for y in singular)
+            ):
+                singular.append(x)
         before = len(inside())
         for guess in guesses[:: len(_REACHES)]:
-            while add(refined(flow, flow.values, guess, found)):
+            while found.add(refined(flow, flow.values, guess, found.regular)):
                 pass
         if len(inside()) == before:
             break
-    return found
+    for x in singular[:_MOST_SINGULAR]:
+        found.add_degenerate(x)
+
+
+def _within(flow: FlowMap, x: Floats) -> bool:
+    """Whether a state lies within the largest box of the search."""
+    return bool((np.abs(x) <= _REACHES[-1] * flow.size).all())
 
 
 def _apart(flow: FlowMap, a: Floats, b: Floats) -> bool:
@@ -161,11 +296,19 @@ def equilibrium_at(flow: FlowMap, values: Floats, x: Floats) -> Equilibrium:
 
 
 def refined(flow: FlowMap, values: Floats, guess: Floats, known: Sequence[Floats] = ()) -> Floats | None:
-    """The equilibrium that Powell's method finds from a guess, if it is one.
+    """The regular equilibrium that Powell's method finds from a guess, if it is one.
 
     Those that are `known` are divided out (deflation), so that the method goes elsewhere. A guess at which
     the rates are undefined is replaced by its absolute values.
     """
+    x, regular = _rest_from(flow, values, guess, known)
+    return x if regular else None
+
+
+def _rest_from(
+    flow: FlowMap, values: Floats, guess: Floats, known: Sequence[Floats] = ()
+) -> tuple[Floats | None, bool]:
+    """The state at which Powell's method finds no rates, and whether their derivatives are regular there."""
     unit, model = flow.clock / flow.size, flow.with_values(values)
 
     def rates(scaled: Floats) -> Floats:
@@ -187,10 +330,25 @@ def refined(flow: FlowMap, values: Floats, guess: Floats, known: Sequence[Floats
                 start = optimize.root(deflated, start, jac=by_state).x
             found = optimize.root(rates, start, jac=slopes, options={"xtol": 1e-14})
         except (ModelError, ValueError):
-            return None
-        near = np.abs(found.fun).max() < _REST * max(1.0, np.abs(found.x).max())
-        regular = near and np.linalg.cond(slopes(found.x)) < 1e12
-    return found.x * flow.size if regular else None
+            return None, False
+        if not np.abs(found.fun).max() < _REST * max(1.0, np.abs(found.x).max()):
+            return None, False
+        matrix = slopes(found.x)
+        regular = bool(np.linalg.cond(matrix) < 1e12)
+        if regular:
+            # Beside a multiple root rates are small too.
+            regular = _margin(flow, values, found.x, matrix) > _EXACT * max(1.0, np.abs(found.x).max())
+    return found.x * flow.size, regular
+
+
+def _margin(flow: FlowMap, values: Floats, scaled: Floats, matrix: Floats) -> float:
+    """About how far from a scaled state the derivatives of the rates become singular, in typical sizes."""
+    least = float(np.linalg.svd(matrix, compute_uv=False)[-1])
+    if least > _CLEAR:
+        return np.inf
+    second = expansion(flow, values, scaled * flow.size, higher=True).second
+    bend = second * (flow.clock / flow.size)[:, None, None] * flow.size[:, None] * flow.size
+    return least / max(float(np.abs(bend).max()), 1e-300)
 
 
 def _deflated(

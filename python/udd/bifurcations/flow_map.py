@@ -21,6 +21,7 @@ __all__ = ["Floats", "FlowMap", "SegmentEnds", "flow_of"]
 Floats = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
+_NOTHING = 1e-100  # a smaller state is 0 but for rounding
 
 
 @dataclass(frozen=True)
@@ -169,6 +170,7 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing 
     require_model(model)
     # A component that happens to be small is no smaller than a tenth of the largest.
     seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
+    seen[seen < _NOTHING] = 0.0
     found = coordinates_of(model, seen)
     finite = np.where(np.isfinite(found.size), found.size, 1.0)
     kept = np.flatnonzero(np.isfinite(found.size))

@@ -70,12 +70,15 @@ class Equilibrium:
         Of the rates' derivative by the components that the rates depend on; largest real part first.
     kind : str
         "stable focus", "stable node", "saddle", "saddle-focus", "unstable node", "unstable focus"; "centre"
-        where small swings neither grow nor decay.
+        where small swings neither grow nor decay; "degenerate" if it is a multiple root of the rates, "not
+        isolated" if it lies on a curve or surface of equilibria.
     residual : float
         What is left of the rates, in typical sizes per typical time.
     lyapunov_coefficient : float
         The first Lyapunov coefficient of the complex pair nearest to the imaginary axis, NaN where there is
         none: where the pair crosses the axis, a Hopf bifurcation is supercritical if it is negative.
+    isolated : bool
+        Whether no other equilibria lie arbitrarily near.
     """
 
     model: Model
@@ -84,6 +87,7 @@ class Equilibrium:
     kind: str
     residual: float
     lyapunov_coefficient: float
+    isolated: bool = True
 
     @property
     def stable(self) -> bool:
