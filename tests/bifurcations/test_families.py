@@ -117,7 +117,8 @@ def test_what_is_not_kept_is_refused() -> None:
     assert np.isnan(swing.period_error)
     # Of two rounds the map keeps two things to first order: energy, and what bifurcates.
     curve, base, _ = doubled(point._curve, point._place)
-    slope = curve.flow.size * np.array([0.0, curve.nodes(base)[0][1], 0.0, curve.nodes(base)[0][3]])
+    x, y, u, v = curve.nodes(base)[0]
+    slope = curve.flow.size * np.array([x + 2 * x * y, y + x**2 - y**2, u, v])
     assert abs(curve.free @ slope) == pytest.approx(np.linalg.norm(slope), rel=1e-9)
 
 

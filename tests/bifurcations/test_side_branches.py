@@ -43,3 +43,25 @@ def test_a_stirred_reactor_has_its_folds_and_hopf_points() -> None:
     folds, hopf = ([point.value for point in branch.find(kind)] for kind in ("fold", "Hopf"))
     assert sorted(folds) == pytest.approx([0.13120135299213, 0.13180269963844], abs=1e-11)
     assert sorted(hopf) == pytest.approx([0.13155128618053, 0.13250235640209], abs=1e-11)
+
+
+def test_a_side_branch_of_cycles_has_its_symmetry_breaking_among_its_points() -> None:
+    start = udd.periodic_orbit(udd.DLE(6.9), settle=600.0)
+    assert not start.symmetric
+    branch = udd.continuation(start, "w", (6.5, 7.5), direction="up")
+    (point,) = branch.points
+    assert point.kind == "symmetry breaking" and abs(point.value - 7.09642643066) <= point.error + 1e-11
+    assert branch.ends[1] == "a symmetry breaking at 7.096426431"
+    assert isinstance(point.solution, udd.PeriodicOrbit) and point.solution.symmetric
+    # The same point along the symmetric cycles.
+    (other,) = udd.continuation(udd.periodic_orbit(udd.DLE(7.3)), "w", (7.0, 7.5)).points
+    assert abs(point.value - other.value) <= point.error + other.error
+
+
+def test_a_branch_of_doubled_cycles_has_the_doubling_among_its_points() -> None:
+    start = udd.periodic_orbit(udd.DLE(5.2), settle=600.0)
+    branch = udd.continuation(start, "w", (5.15, 5.6), direction="up")
+    (point,) = branch.points
+    assert point.kind == "period doubling" and abs(point.value - 5.394713224) < 1e-9 and point.error < 1e-9
+    assert isinstance(point.solution, udd.PeriodicOrbit)
+    assert branch.periods[-1] == pytest.approx(2.0 * point.solution.period, rel=1e-3)

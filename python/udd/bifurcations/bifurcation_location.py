@@ -131,7 +131,7 @@ def turning(
 
 
 def pitchfork_at(
-    curve: EquilibriumCurve, a: CurvePoint, step: float, sigma: float
+    curve: AnyCurve, a: CurvePoint, step: float, sigma: float
 ) -> tuple[float, CurvePoint, float]:
     """The pitchfork near the distance `sigma` from `a`, where the parameter turns along its side branch.
 

@@ -17,7 +17,7 @@ from udd.models import Model, beyond_the_edge
 
 from .bifurcation_functions import TestFunctions
 from .branch import AnyCurve, BifurcationPoint, Branch
-from .branch_following import BranchTrace, ContinuationLimits, follow_branch
+from .branch_following import CLOSED, BranchTrace, ContinuationLimits, follow_branch
 from .branch_switching import born_at
 from .conservative_families import PERIOD, Conserved, FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
@@ -62,8 +62,8 @@ def continuation(
     direction : {"both", "up", "down"}
         Whether the parameter rises or falls from the start on, or the branch is followed both ways.
     ds, ds_max : float
-        The first and the longest step, in arclength: states count in typical sizes, the parameter in units
-        of its value at the start.
+        The first and the longest step, in arclength: states count in typical sizes, the parameter in fifths
+        of the way between the bounds, or in units of its value at the start if a bound is infinite.
     max_points : int
         Points at most, in either direction.
     max_period : float, optional
@@ -131,12 +131,12 @@ def continuation(
     ds_max = max(number("ds_max", ds_max, above=0.0), ds)
     if isinstance(start, BifurcationPoint):
         size = number("amplitude", amplitude, above=0.0)
-        curve, place, off = born_at(start, size)
+        curve, place, off = born_at(_in_unit_of(start, low, high), size)
         ds *= min(1.0, off / size)
         model = start.solution.model
     else:
         model = start.model
-        curve, place = _at(start, parameter)
+        curve, place = _at(start, parameter, low, high)
     value = curve.value(place.u)
     if not low <= value <= high:
         raise ModelError(
@@ -153,7 +153,7 @@ def continuation(
     ways = []
     if direction in ("both", "down"):
         ways.append(follow_branch(curve, CurvePoint(up.u, -up.tangent), limits))
-    if direction in ("both", "up"):
+    if direction == "up" or (direction == "both" and ways[0].end != CLOSED):
         ways.append(follow_branch(curve, up, limits))
     return branch_from(ways, model, parameter, "the start")
 
@@ -169,6 +169,26 @@ def bounds_of(bounds: Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
+def unit_of(value: float, low: float, high: float) -> float:
+    """The unit in which a parameter counts: a fifth of the way between its bounds, else its own size."""
+    return (high - low) / 5.0 if np.isfinite(high - low) else abs(value) or 1.0
+
+
+def _in_unit_of(point: BifurcationPoint, low: float, high: float) -> BifurcationPoint:
+    """The point with its parameter in the unit of these bounds; as it is if one of them is infinite."""
+    curve, place = point._curve, point._place
+    if curve is None or place is None or isinstance(curve, FamilyCurve) or not np.isfinite(high - low):
+        return point
+    scale = unit_of(point.value, low, high)
+    factor = np.append(np.ones(len(place.u) - 1), curve.scale / scale)
+    along = place.tangent * factor
+    return replace(
+        point,
+        _curve=replace(curve, scale=scale),
+        _place=CurvePoint(place.u * factor, along / np.linalg.norm(along)),
+    )
+
+
 def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[[BifurcationPoint], bool]:
     if until is None:
         return lambda point: False
@@ -177,7 +197,9 @@ def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[
     return until
 
 
-def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, CurvePoint]:
+def _at(
+    start: Equilibrium | PeriodicOrbit, parameter: str, low: float, high: float
+) -> tuple[AnyCurve, CurvePoint]:
     """The curve through a solution, and the place there."""
     made = start._curve if isinstance(start, PeriodicOrbit) else None
     forcing = None if made is None else made.flow.forcing
@@ -191,8 +213,7 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, C
     value = 0.0 if family else float(flow.values[index])
     curve: AnyCurve
     if isinstance(start, Equilibrium):
-        scale = abs(value) or 1.0
-        curve = EquilibriumCurve(flow, flow.values, index, scale)
+        curve = EquilibriumCurve(flow, flow.values, index, unit_of(value, low, high))
         u = curve.pack(flow.reduced(start.state), value)
     else:
         if start._curve is None or start._unknowns is None:
@@ -203,7 +224,7 @@ def _at(start: Equilibrium | PeriodicOrbit, parameter: str) -> tuple[AnyCurve, C
         kept = Conserved.of(own, parameter) if family and parameter != PERIOD else None
         if kept is not None:
             value = kept.at(own, nodes[0])[0]
-        scale = abs(value) or 1.0
+        scale = unit_of(value, low, high)
         where = old.mirror, old.shift, old.reference, old.across, old.share
         common = own, flow.values, index, scale, span, old.pieces, *where
         curve = FamilyCurve(*common, conserved=kept) if family else PeriodicOrbitCurve(*common)
@@ -236,7 +257,8 @@ def branch_from(ways: list[BranchTrace], model: Model, parameter: str, begin: st
         points += [replace(p, arclength=length + p.arclength) for p in on.points]
         ends = (back.end, on.end)
     else:
-        entries, points, ends = ways[0].places, ways[0].points, (begin, ways[0].end)
+        way = ways[0]
+        entries, points, ends = way.places, way.points, (CLOSED if way.end == CLOSED else begin, way.end)
     values = np.array([curve.value(place.u) for curve, place, _, _ in entries])
     symmetric = False
     multipliers, states, periods = [], [], []

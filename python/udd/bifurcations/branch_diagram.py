@@ -141,14 +141,12 @@ def diagram(
     for value in (axis[0], axis[len(axis) // 2], axis[-1]):
         for rest in equilibria(model.with_parameters({parameter: float(value)})):
             if not any(_has(branch, rest, float(value)) for branch in branches):
-                branches.append(
-                    continuation(rest, parameter, bounds, max_points=max_points, ds_max=_steps(axis))
-                )
+                branches.append(continuation(rest, parameter, bounds, max_points=max_points))
     cycles: list[Branch] = []
     for orbit, value in _seeds(model, parameter, scan):
         if not any(_has(branch, orbit, value) for branch in cycles):
-            cycles.append(continuation(orbit, parameter, ds_max=_steps(axis), **limits))
-    grown = descendants([*branches, *cycles], generations, ds_max=_steps(axis), **limits)
+            cycles.append(continuation(orbit, parameter, **limits))
+    grown = descendants([*branches, *cycles], generations, **limits)
     rests = [branch for branch in grown if branch.kind == "equilibrium"]
     return Diagram(model, parameter, scan, (*rests, *(branch for branch in grown if branch.kind == "cycle")))
 
@@ -183,12 +181,6 @@ def descendants(
             found.append(born)
             waiting += [(p, generation + 1) for p in born.points]
     return found
-
-
-def _steps(axis: Floats) -> float:
-    """The longest step: a thirtieth of the way, in units of the parameter's value in the middle."""
-    middle = abs(float(axis[len(axis) // 2])) or 1.0
-    return float(np.clip((axis[-1] - axis[0]) / middle / 30.0, 0.02, 0.1))
 
 
 def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[PeriodicOrbit, float]]:

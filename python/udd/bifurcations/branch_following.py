@@ -14,12 +14,13 @@ from udd.errors import IntegrationError
 from .bifurcation_functions import FUNCTIONS, TestFunctions, test_functions_at
 from .bifurcation_location import bifurcations_between, location_error, pitchfork_at, point_at
 from .branch import AnyCurve, BifurcationPoint
+from .branch_ends import closes, hopf_end, origin_of, size_of, vanishing_part
 from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import rounding_of
 from .nonsmooth import corner_ahead
-from .periodic_orbits import has_shorter_period, pieces_for
+from .periodic_orbits import pieces_for
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
@@ -30,13 +31,17 @@ from .pseudo_arclength import (
 )
 from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["BranchTrace", "ContinuationLimits", "follow_branch"]
+__all__ = ["CLOSED", "BranchTrace", "ContinuationLimits", "follow_branch"]
 
 _WATCHED = 6  # points in which a branch shows that it comes to a connection,
 _CONVERGED = 1e-11  # by this relative change of its parameter
 _GROWN = 1.005  # while the period grows by this factor
+_LOOP = 8  # points at least of a closed branch
 _ASIDE = 1e-9  # from a corner, in scaled unknowns
 _SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
+_SMALL = 0.1  # typical sizes: where no smaller orbit is found, this one may have come from a Hopf bifurcation
+_BEFORE = 0.95  # of the way to a Hopf point is the last cycle that is kept
+CLOSED = "the branch is closed"
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,12 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
             there, gone, step = predictor_corrector_step(curve, here, step, limits.longest)
             after = test_functions_at(curve, there)
         except (CorrectorFailed, IntegrationError) as error:
-            way.end = f"lost: {error}"
+            small = isinstance(curve, PeriodicOrbitCurve) and size_of(curve, here.u) < _SMALL
+            if not small or not _record_hopf(curve, here, 0.0, signs, way, limits, arclength):
+                way.end = f"lost: {error}"
+            return way
+        part = vanishing_part(curve, here.u, there.u)
+        if part is not None and _record_hopf(curve, here, part * gone, signs, way, limits, arclength):
             return way
         _locate_bifurcations(curve, here, gone, signs, after, way, limits, arclength)
         if way.end:
@@ -96,6 +106,11 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
             way.end = f"{curve.name} = {_end_at_bound(curve, here, gone, way, arclength, limits):.6g}"
             return way
         arclength += gone
+        if len(way.places) > _LOOP and closes(way.places[0][:2], curve, here, there, gone):
+            way.places.append((curve, there, after, arclength))
+            way.points = _once(way.points)
+            way.end = CLOSED
+            return way
         if isinstance(curve, PeriodicOrbitCurve):
             if curve.period(there.u) > limits.period:
                 way.places.append((curve, there, after, arclength))
@@ -109,9 +124,6 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
         way.places.append((curve, here, signs, arclength))
         if isinstance(curve, PeriodicOrbitCurve) and (near := _connection(way)) is not None:
             way.end = f"a connection near {near:.13g}: the period grows without bound"
-            return way
-        if len(way.places) > 8 and _closes(way.places[0], here, step):
-            way.end = "the branch is closed"
             return way
 
 
@@ -129,11 +141,7 @@ def _locate_bifurcations(
     for kind, sigma, place, signs in bifurcations_between(curve, here, gone, before, after):
         if kind == "end":
             # The parameter turns where no multiplier passes 1: the branch meets itself there.
-            if isinstance(curve, EquilibriumCurve):
-                sigma, place = _record_pitchfork(curve, here, gone, sigma, place, way, limits, arclength)
-            else:
-                way.places.append((curve, place, signs, arclength + sigma))
-            way.end = _branch_origin(curve, place, here)
+            _record_origin(curve, here, gone, sigma, place, signs, way, limits, arclength)
         else:
             errors = _errors(curve, here, sigma, place, gone, kind)
             _record_point(curve, place, signs, kind, errors, way, limits, arclength + sigma)
@@ -141,24 +149,73 @@ def _locate_bifurcations(
             return
 
 
-def _record_pitchfork(
-    curve: EquilibriumCurve,
+def _record_hopf(
+    curve: AnyCurve,
+    here: CurvePoint,
+    distance: float,
+    before: TestFunctions,
+    way: BranchTrace,
+    limits: ContinuationLimits,
+    arclength: float,
+) -> bool:
+    """Note the Hopf point to which cycles shrink at a distance from `here`; False if there is none."""
+    if not isinstance(curve, PeriodicOrbitCurve) or isinstance(curve, FamilyCurve):
+        return False
+    try:
+        point = hopf_end(curve, here.u)
+    except (CorrectorFailed, IntegrationError):
+        return False
+    if point is None:
+        return False
+    with suppress(CorrectorFailed, IntegrationError):
+        near = _BEFORE * distance
+        u = newton_corrector(curve, here.u + near * here.tangent, here.tangent)
+        last = CurvePoint(u, tangent_at(curve, u, here.tangent))
+        if near > 0.0 and vanishing_part(curve, here.u, u) is None:
+            after = test_functions_at(curve, last)
+            _locate_bifurcations(curve, here, near, before, after, way, limits, arclength)
+            if way.end:
+                return True
+            if limits.low <= curve.value(u) <= limits.high:
+                way.places.append((curve, last, after, arclength + near))
+    if not limits.low <= point.value <= limits.high:
+        return False
+    way.points.append(replace(point, arclength=arclength + distance))
+    way.end = f"a Hopf bifurcation at {point.value:.10g}"
+    return True
+
+
+def _record_origin(
+    curve: AnyCurve,
     here: CurvePoint,
     gone: float,
     sigma: float,
     place: CurvePoint,
+    signs: TestFunctions,
     way: BranchTrace,
     limits: ContinuationLimits,
     arclength: float,
-) -> tuple[float, CurvePoint]:
-    """Note the pitchfork at which a side branch turns, and return its distance and place."""
+) -> None:
+    """Note the bifurcation at which a side branch turns: it ends there."""
+    value = curve.value(place.u)
+    if isinstance(curve, FamilyCurve):
+        way.places.append((curve, place, signs, arclength + sigma))
+        size = size_of(curve, place.u) / size_of(curve, here.u)
+        way.end = f"{'an equilibrium' if size < _SHRUNK else 'a branch point'} near {value:.5g}"
+        return
+    point = origin_of(curve, place.u, gone) if isinstance(curve, PeriodicOrbitCurve) else None
+    if point is not None:
+        way.places.append((curve, place, signs, arclength + sigma))
+        way.points.append(replace(point, arclength=arclength + sigma))
+        way.end = f"a {point.kind} at {point.value:.10g}"
+        return
     error = float("nan")
     # If the curve cannot be followed about it, the place is less accurate.
     with suppress(CorrectorFailed, IntegrationError):
         sigma, place, error = pitchfork_at(curve, here, gone, sigma)
     signs, errors = test_functions_at(curve, place), (error, float("nan"))
     _record_point(curve, place, signs, "branch point", errors, way, limits, arclength + sigma)
-    return sigma, place
+    way.end = f"a branch point at {curve.value(place.u):.10g}"
 
 
 def _record_point(
@@ -186,19 +243,6 @@ def _errors(
         return location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
     except (CorrectorFailed, IntegrationError):
         return float("nan"), float("nan")
-
-
-def _branch_origin(curve: AnyCurve, place: CurvePoint, before: CurvePoint) -> str:
-    """What it is that the branch begins or ends with."""
-    value = curve.value(place.u)
-    if isinstance(curve, EquilibriumCurve):
-        return f"a branch point near {value:.5g}"
-    size = float(np.ptp(curve.nodes(place.u) / curve.flow.size, axis=0).max())
-    if size < _SHRUNK * float(np.ptp(curve.nodes(before.u) / curve.flow.size, axis=0).max()):
-        what = "an equilibrium" if isinstance(curve, FamilyCurve) else "a Hopf bifurcation"
-        return f"{what} near {value:.5g}"
-    kind = has_shorter_period(curve, place.u)
-    return f"{kind or 'a branch point'} near {value:.5g}"
 
 
 def _end_at_bound(
@@ -267,12 +311,12 @@ def _connection(way: BranchTrace) -> float | None:
     return values[-1] if still and growing else None
 
 
-def _closes(first: tuple[AnyCurve, CurvePoint, TestFunctions, float], here: CurvePoint, step: float) -> bool:
-    """Whether the branch has come back to where it began."""
-    start = first[1]
-    if len(start.u) != len(here.u):
-        return False
-    return bool(np.linalg.norm(start.u - here.u) < 0.5 * step and start.tangent @ here.tangent > 0.9)
+def _once(points: list[BifurcationPoint]) -> list[BifurcationPoint]:
+    """The points of a closed branch; those that come again on its last step once."""
+    first, near = points[0] if points else None, 1e-6
+    if len(points) < 2 or first is None or points[-1].kind != first.kind:
+        return points
+    return points[:-1] if abs(points[-1].value - first.value) < near * (abs(first.value) or 1.0) else points
 
 
 def _round_corner(

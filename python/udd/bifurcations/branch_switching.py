@@ -138,28 +138,15 @@ def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbi
     pieces = max(4, pieces_for(flow, period))
     phases = np.exp(2j * np.pi * np.arange(pieces) / pieces)
     away = np.outer(phases, vectors[:, k]).real
-    ones, zeros = np.ones(flow.dim), np.zeros(flow.dim)
+    ones, rest = np.ones(flow.dim), np.tile(x, (pieces, 1))
     new = PeriodicOrbitCurve(
-        flow, curve.values, curve.parameter, curve.scale, period, pieces, ones, zeros, x, zeros
+        flow, curve.values, curve.parameter, curve.scale, period, pieces, ones, 0.0 * ones, rest, 0.0 * rest
     )
-    base = new.pack(np.tile(x, (pieces, 1)), period, curve.value(place.u))
+    base = new.pack(rest, period, curve.value(place.u))
     row = new.pack(away, 0.0, 0.0)
-    row /= np.linalg.norm(row)
-    # The plane across the ellipse where it begins: at rest there is no flow to lie across.
-    rate = expansion(flow, values, x).by_state @ away[0]
-    new.across = rate / np.linalg.norm(rate / flow.size) / flow.size**2
-    # The plane goes through the ellipse's own beginning; `away[0]` need not lie across its rate.
-    return _through(new, x, away[0]), base, row
-
-
-def _through(curve: PeriodicOrbitCurve, x: Floats, away: Floats) -> PeriodicOrbitCurve:
-    """The curve whose plane holds both the equilibrium and the first node beside it."""
-    scaled = curve.across * curve.flow.size
-    side = away / curve.flow.size
-    scaled = scaled - side * (scaled @ side) / (side @ side)
-    curve.across = scaled / np.linalg.norm(scaled) / curve.flow.size
-    curve.reference = x
-    return curve
+    # At rest there is no flow: the phase is that of the ellipse, along which the linear law turns.
+    new.fix_phase_along(rest, away @ expansion(flow, values, x).by_state.T)
+    return new, base, row / np.linalg.norm(row)
 
 
 def _crossing(curve: AnyCurve, place: CurvePoint) -> tuple[AnyCurve, Floats, Floats]:

@@ -23,8 +23,8 @@ class CyclicEquations:
     pieces : ndarray, shape (m, r, r)
     after : float
     both : ndarray, shape (m, r, 2)
-    phase : ndarray, shape (r,)
-        The last row: of the first node's components,
+    phase : ndarray, shape (m, r)
+        The last row: of the nodes' components,
     last : ndarray, shape (2,)
         and of the two numbers.
     """
@@ -45,7 +45,7 @@ class CyclicEquations:
         matrix = np.zeros((m * r + 1, m * r + 2))
         matrix[:-1, :-2] = dense.reshape(m * r, m * r)
         matrix[:-1, -2:] = self.both.reshape(m * r, 2)
-        matrix[-1, :r], matrix[-1, -2:] = self.phase, self.last
+        matrix[-1, :-2], matrix[-1, -2:] = self.phase.ravel(), self.last
         return matrix
 
     def solve(self, row: Floats, right: Floats) -> Floats:
@@ -92,10 +92,10 @@ class CyclicEquations:
             x[where[1::2]] = -np.linalg.solve(t, right_sides)
         small = np.zeros((r + 2, r + 3))
         small[:r, :r], small[:r, r:] = begin[0] + end[0], rest[0]
-        small[r, :r], small[r, r : r + 2], small[r, r + 2] = self.phase, self.last, right[-2]
-        small[r + 1] = row[:-2] @ x[:m].reshape(m * r, r + 3)
-        small[r + 1, r : r + 2] += row[-2:]
-        small[r + 1, r + 2] += right[-1]
+        each = x[:m].reshape(m * r, r + 3)
+        small[r], small[r + 1] = self.phase.ravel() @ each, row[:-2] @ each
+        small[r:, r : r + 2] += self.last, row[-2:]
+        small[r:, r + 2] += right[-2:]
         few = np.linalg.solve(small[:, :-1], small[:, -1])
         nodes = x[:m] @ np.append(few, -1.0)
         return np.append(nodes.ravel(), few[r:])

@@ -141,9 +141,9 @@ class FamilyCurve(PeriodicOrbitCurve):
         """The time until the orbit closes."""
         return float(u[-1 if self.conserved is None else -2] * self.clock)
 
-    def fix_phase(self, u: Floats) -> None:
+    def fix_phase(self, u: Floats, first: bool = False) -> None:
         """Take this orbit's first node for the reference, and see in which direction the last gap is free."""
-        super().fix_phase(u)
+        super().fix_phase(u, first)
         self.free = self.slope(u)
 
     def slope(self, u: Floats) -> Floats:

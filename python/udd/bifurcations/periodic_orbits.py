@@ -30,7 +30,7 @@ from .solutions import PeriodicOrbit
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["closed", "cycle_at", "flown", "has_shorter_period", "periodic_orbit", "pieces_for"]
+__all__ = ["closed", "cycle_at", "flown", "half_of", "periodic_orbit", "pieces_for"]
 
 _FINE = 64  # states looked at in a typical time
 _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
@@ -201,10 +201,10 @@ def closed(
     scale = abs(value) or 1.0
     share = 1.0 if flow.forcing is None else span / flow.forcing.period(flow.values)[0]
     curve = PeriodicOrbitCurve(
-        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes[0], np.zeros(flow.dim), share
+        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes, np.zeros_like(nodes), share
     )
     guess = curve.pack(nodes, span, value)
-    curve.fix_phase(guess)
+    curve.fix_phase(guess, first=True)  # the state that is returned is the one near the guess
     tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
     row = natural_constraint(guess)
     # Where energy is kept cycles come in families: near one the equations leave a direction nearly free.
@@ -236,20 +236,22 @@ def _no_cycle(curve: PeriodicOrbitCurve, u: Floats) -> str:
     return "the orbit shrinks to a state of rest" if rest < 1e-9 or short else ""
 
 
-def has_shorter_period(curve: PeriodicOrbitCurve, u: Floats) -> str:
-    """Of which bifurcation an orbit is that closes after half its time already, if it does."""
-    if curve.symmetric:
-        return ""
+def half_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[str, PeriodicOrbitCurve, Floats]:
+    """The bifurcation whose orbit closes after half this time, its curve and its nodes; "" for none."""
     flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
-    end = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))[-1]
-    ways = [(np.ones(flow.dim), "a period doubling")]
+    nodes = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))
+    ways = [(np.ones(flow.dim), "period doubling")]
     if flow.mirror is not None:
-        ways.append((flow.mirror, "a symmetry breaking"))
-    for mirror, kind in ways:
-        gap = mirror * end - start
-        if np.abs((gap + flow.turns(gap)) / flow.size).max() < _HALF:
-            return kind
-    return ""
+        ways.append((flow.mirror, "symmetry breaking"))
+    for mirror, kind in () if curve.symmetric else ways:
+        gap = mirror * nodes[-1] - start
+        shift = flow.turns(gap)
+        if np.abs((gap + shift) / flow.size).max() < _HALF:
+            share = curve.share / 2.0
+            own = replace(curve, pieces=len(nodes) - 1, mirror=mirror, shift=shift, share=share)
+            own.fix_phase(own.pack(nodes[:-1], half, curve.value(u)))
+            return kind, own, nodes[:-1]
+    return "", curve, nodes[:-1]
 
 
 def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve, Floats]:

@@ -31,8 +31,9 @@ class PeriodicOrbitCurve:
 
     The orbit is cut into pieces of equal time. What comes out of the last one, seen in the mirror where
     `mirror` has signs and turned by `shift`, must be where the first one starts: a symmetric cycle is
-    followed over half its period. The phase is fixed by the plane through a reference across its flow; that
-    of a forced model by the time, and instead the orbit lasts as long as the forcing says.
+    followed over half its period. The phase is fixed by an integral condition: all nodes together do not move
+    along the flow of a reference orbit. That of a forced model is fixed by the time, and instead the orbit
+    lasts as long as the forcing says.
 
     Attributes
     ----------
@@ -49,8 +50,8 @@ class PeriodicOrbitCurve:
         Signs, all of them +1 where there is no mirror.
     shift : ndarray (r,)
         What is added at the end: turns of angles.
-    reference, across : ndarray (r,)
-        The plane that the first node lies in.
+    reference, across : ndarray (m, r)
+        The nodes of the reference orbit, and the weights of the nodes' distances from them.
     share : float
         Of a forced model: after how many of the forcing's periods the orbit closes.
     """
@@ -109,13 +110,19 @@ class PeriodicOrbitCurve:
             values[self.parameter] = self.value(u)
         return values
 
-    def fix_phase(self, u: Floats) -> None:
-        """Take this orbit's first node for the reference."""
+    def fix_phase(self, u: Floats, first: bool = False) -> None:
+        """Take this orbit for the reference; of its nodes only the `first` where that is asked for."""
         if self.flow.forcing is not None:
             return
-        self.reference = self.nodes(u)[0]
-        rate = self.rate_at(self.values_at(u), self.reference)
-        self.across = rate / np.linalg.norm(rate / self.flow.size) / self.flow.size**2
+        rates = self._rates_at_nodes(u)
+        if first:
+            rates[1:] = 0.0
+        self.fix_phase_along(self.nodes(u), rates)
+
+    def fix_phase_along(self, nodes: Floats, rates: Floats) -> None:
+        """Take these nodes (m, r) for the reference; orbits do not move along these rates (m, r) from it."""
+        self.reference = nodes
+        self.across = rates / np.linalg.norm(rates / self.flow.size) / self.flow.size**2
 
     def begins(self, u: Floats) -> Floats:
         """When the pieces begin (m,); always at 0 where the law does not ask."""
@@ -152,7 +159,7 @@ class PeriodicOrbitCurve:
         by_value = found.by_parameter[:, :, 0] * turn / size * self.scale
         forcing = self.flow.forcing
         if forcing is None:
-            phase, first = float(self.across @ (nodes[0] - self.reference)), self.across * size / weight
+            phase, along = float((self.across * (nodes - self.reference)).sum()), self.across * size / weight
             last = np.zeros(2)
         else:
             # A later piece also begins later, by as much as those before it take longer.
@@ -160,7 +167,7 @@ class PeriodicOrbitCurve:
             moved = found.rate - np.einsum("mij,mj->mi", found.by_state, rates)
             by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
             period, by_values = forcing.period(self.values_at(u))
-            phase, first = (self.span(u) - self.share * period) / self.clock, np.zeros(r)
+            phase, along = (self.span(u) - self.share * period) / self.clock, np.zeros((m, r))
             by_own = 0.0 if self.parameter == HELD else float(by_values[self.parameter])
             last = np.array([1.0, -self.share * by_own * self.scale / self.clock])
         residual = np.append(gaps.ravel(), phase)
@@ -172,10 +179,10 @@ class PeriodicOrbitCurve:
                 dense[rows, rows] += by_state[i]
                 dense[rows, after : after + r] -= np.eye(r) / weight
             dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
-            dense[n, :r], dense[n, n:] = first, last
+            dense[n, :n], dense[n, n:] = along.ravel(), last
             return residual, dense
         both = np.stack([by_span, by_value], axis=2)
-        return residual, CyclicEquations(by_state, 1.0 / weight, both, first, last)
+        return residual, CyclicEquations(by_state, 1.0 / weight, both, along, last)
 
     def _rates_at_nodes(self, u: Floats) -> Floats:
         model = self.flow.with_values(self.values_at(u))

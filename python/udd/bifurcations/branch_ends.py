@@ -1,0 +1,153 @@
+"""What a branch of cycles ends in: a Hopf point, the branch from which it bifurcates, or its start."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from udd.errors import IntegrationError
+
+from .bifurcation_functions import FUNCTIONS, test_functions_at
+from .bifurcation_location import bifurcations_between, location_error, point_at
+from .branch import AnyCurve, BifurcationPoint
+from .branch_solutions import solution_at
+from .equilibrium_curve import EquilibriumCurve
+from .flow_map import Floats
+from .periodic_orbits import half_of
+from .pseudo_arclength import (
+    CorrectorFailed,
+    CurvePoint,
+    natural_constraint,
+    newton_corrector,
+    predictor_corrector_step,
+    tangent_at,
+)
+from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["closes", "hopf_end", "origin_of", "size_of", "vanishing_part"]
+
+_STEPS = 24  # along the other branch, in either direction, until the bifurcation is met
+_RATIO = 1.3  # of the cycle's period to that of the Hopf bifurcation at most
+_FARTHEST = 3.0  # sizes of the cycle between its centre and the equilibrium
+_SHORTEST = 1e-4  # step along the other branch
+
+
+def vanishing_part(curve: AnyCurve, a: Floats, b: Floats) -> float | None:
+    """The part of the step from `a` to `b` after which the orbit has no size; None if it keeps its shape.
+
+    Beyond a Hopf point the branch returns on the mirrored amplitude: the same cycles, half a period later.
+    """
+    if not isinstance(curve, PeriodicOrbitCurve):
+        return None
+    before, after = _shape(curve, a), _shape(curve, b)
+    first = float(np.linalg.norm(before))
+    last = float((before * after).sum()) / first if first else 0.0
+    return first / (first - last) if last <= 0.0 and first > 0.0 else None
+
+
+def size_of(curve: PeriodicOrbitCurve, u: Floats) -> float:
+    """The root mean square of an orbit's distance from its centre, in typical sizes."""
+    return float(np.linalg.norm(_shape(curve, u))) / float(np.sqrt(curve.pieces))
+
+
+def _orbit(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
+    nodes = curve.nodes(u)
+    return np.vstack([nodes, curve.mirror * nodes]) if curve.symmetric else nodes
+
+
+def _shape(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
+    scaled = _orbit(curve, u) / curve.flow.size
+    shape: Floats = (scaled - scaled.mean(axis=0))[: curve.pieces]
+    return shape
+
+
+def hopf_end(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
+    """The Hopf bifurcation from which a small cycle comes, as the branch of equilibria has it."""
+    flow, size, period = curve.flow, size_of(curve, u), curve.period(u)
+    rest = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
+    centre = _orbit(curve, u).mean(axis=0)
+    point = _nearest(rest, rest.pack(centre, curve.value(u)), "Hopf", max(0.3 * size, _SHORTEST))
+    if point is None or not 1.0 / _RATIO < period / point.period < _RATIO:
+        return None
+    away = np.linalg.norm((flow.reduced(point.solution.state) - centre) / flow.size)
+    return point if away < _FARTHEST * size + _SHORTEST else None
+
+
+def origin_of(curve: PeriodicOrbitCurve, u: Floats, step: float) -> BifurcationPoint | None:
+    """The doubling or the symmetry breaking from which a cycle comes whose halves are nearly the same."""
+    try:
+        kind, half, nodes = half_of(curve, u)
+    except (CorrectorFailed, IntegrationError):
+        return None
+    if not kind:
+        return None
+    return _nearest(half, half.pack(nodes, 0.5 * curve.span(u), curve.value(u)), kind, 0.5 * step)
+
+
+def _nearest(curve: AnyCurve, guess: Floats, kind: str, step: float) -> BifurcationPoint | None:
+    """The bifurcation of a kind on the curve through a guess, the nearer one of both directions."""
+    found: list[BifurcationPoint] = []
+    for sense in (1.0, -1.0):
+        try:
+            u = newton_corrector(curve, guess, natural_constraint(guess), patience=20)
+            here, size = CurvePoint(u, sense * tangent_at(curve, u, natural_constraint(u))), step
+            signs = test_functions_at(curve, here)
+            for _ in range(_STEPS):
+                there, gone, size = predictor_corrector_step(curve, here, size, step)
+                after = test_functions_at(curve, there)
+                met = [one for one in bifurcations_between(curve, here, gone, signs, after) if one[0] == kind]
+                if met:
+                    _, sigma, place, at = met[0]
+                    errors = location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
+                    solution = solution_at(curve, place.u)
+                    found.append(point_at(curve, kind, place, at, solution, 0.0, errors))
+                    break
+                here, signs = there, after
+        except (CorrectorFailed, IntegrationError):
+            continue
+    begin = float(guess[-1]) * curve.scale
+    return min(found, key=lambda point: abs(point.value - begin), default=None)
+
+
+def closes(
+    start: tuple[AnyCurve, CurvePoint], curve: AnyCurve, here: CurvePoint, there: CurvePoint, step: float
+) -> bool:
+    """Whether the branch passes its start between two points that lie `step` apart.
+
+    Cycles are compared without regard to where on them the first node lies.
+    """
+    first, place = start
+    if isinstance(curve, PeriodicOrbitCurve) and isinstance(first, PeriodicOrbitCurve):
+        # Period and parameter; then the orbits themselves.
+        known, along = _numbers(first, place.u), place.tangent[-2:]
+        before, after = _numbers(curve, here.u), _numbers(curve, there.u)
+        if not (before - known) @ along < 0.0 <= (after - known) @ along:
+            return False
+        if np.linalg.norm(after - known) > 1.5 * step or there.tangent[-2:] @ along <= 0.0:
+            return False
+        return _distance(first, place.u, curve, there.u) < 1.5 * step
+    if not isinstance(curve, type(first)):
+        return False
+    gaps = [(point.u - place.u) @ place.tangent for point in (here, there)]
+    near = np.linalg.norm(there.u - place.u) < 1.5 * step
+    return bool(gaps[0] < 0.0 <= gaps[1] and near and place.tangent @ there.tangent > 0.0)
+
+
+def _numbers(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
+    return np.array([curve.span(u) / curve.clock, u[-1]])
+
+
+def _distance(one: PeriodicOrbitCurve, u: Floats, other: PeriodicOrbitCurve, v: Floats) -> float:
+    """The largest distance of one orbit's nodes from the polygon of the other orbit, in typical sizes."""
+    from .orbit_geometry import orbit_states
+
+    flow = one.flow
+    around = flow.reduced(orbit_states(other, v))
+    nodes = _orbit(one, u)
+    gaps = nodes[:, None] - around[None]
+    gaps = (gaps + flow.turns(gaps)) / flow.size
+    sides = np.roll(around, -1, axis=0) - around
+    sides = (sides + flow.turns(sides)) / flow.size
+    squared = np.maximum((sides**2).sum(axis=1), 1e-300)
+    part = np.clip((gaps * sides).sum(axis=2) / squared, 0.0, 1.0)
+    away = np.linalg.norm(gaps - part[:, :, None] * sides, axis=2)
+    return float(away.min(axis=1).max())
