@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from math import prod
 from typing import TYPE_CHECKING, Unpack
@@ -14,6 +13,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.memory import require_memory
+from udd._util.progress import progress_bar
 from udd._util.validation import whole
 from udd.errors import ModelError, interrupted
 from udd.models import Model
@@ -85,8 +85,9 @@ def basins(
         The longest time for the first ``transient + n`` points; by default generous.
     **options
         ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``max_step``,
-        their longest step; ``threads`` (by default one per core); ``progress``, whether to show a progress
-        bar on stderr (by default where that is a terminal); ``partial``, after Ctrl-C to return what there
+        their longest step; ``threads`` (by default one per core); ``progress``, True
+        for a progress bar, False for none, or a function that gets the state of the work as a text (by
+        default a bar after 2 s in a terminal or a notebook); ``partial``, after Ctrl-C to return what there
         is, with a warning, instead of raising it with the exception.
 
     Returns
@@ -149,8 +150,6 @@ def basins(
     >>> found["period"].values.tolist(), found["mirror"].values.tolist()
     ([2, 2], [2, 1])
     """
-    from tqdm import tqdm
-
     xarray = require_xarray()
     n, transient = whole("n", n, 12), whole("transient", transient, 0)
     chosen = with_defaults("basins", RUN_OPTIONS, options)
@@ -162,8 +161,7 @@ def basins(
     judge = MotionClassifier(model, None, coordinates, runner)
     samples = InitialStates(runner, AttractorCatalogue(judge), starts, n, extend * (transient + n))
 
-    shown = sys.stderr.isatty() if chosen["progress"] is None else chosen["progress"]
-    with tqdm(total=len(starts), unit="start", disable=not shown, leave=False) as bar:
+    with progress_bar(len(starts), "start", chosen["progress"], title="basins") as bar:
         stopped = stopped or samples.run(transient, bar)
     told_of = {"n": n, "transient": transient, "max_extension": extend, "complete": int(not stopped)}
     attrs = of_result(runner, "basins of attraction", told_of)

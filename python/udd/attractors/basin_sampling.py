@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.progress import Count
 from udd.models.state_scaling import Floats
 from udd.simulation.outcomes import FINISHED
 
@@ -37,7 +36,7 @@ class InitialStates:
         self.place = np.full(len(starts), -1, dtype=np.int32)
         self.outcome = np.full(len(starts), INTERRUPTED, dtype=np.uint8)
 
-    def run(self, transient: int, bar: Any) -> bool:
+    def run(self, transient: int, bar: Count) -> bool:
         """Do all the work; whether it was stopped by Ctrl-C."""
         jobs = np.arange(len(self.starts))
         spent = transient + self._n
@@ -46,7 +45,7 @@ class InitialStates:
                 if not self._follow(jobs[part], transient):
                     return True
                 bar.update(part.stop - part.start)
-            bar.set_postfix_str("following what is aperiodic")
+            bar.say("following what is aperiodic")
             return self._confirm(spent)
         except KeyboardInterrupt:
             return True

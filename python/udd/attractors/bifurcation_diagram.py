@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from math import prod
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
@@ -14,6 +13,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed, with_defaults
 from udd._util.labelled import require_xarray
 from udd._util.memory import require_memory
+from udd._util.progress import progress_bar
 from udd._util.validation import number, whole
 from udd.chaos.recurrence import SETTLING
 from udd.errors import ModelError, interrupted
@@ -106,9 +106,10 @@ def bifurcation(
         size of the motion, lest it stay on an orbit that is no longer stable; ``match_distance`` (0.25):
         how far an attractor's points may move, on average and relative to the size of the motion, from one
         value to the next; ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs;
-        ``max_step``, their longest step; ``threads`` (by default one per core); ``progress``, whether to
-        show a progress bar on stderr (by default where that is a terminal); ``partial``, after Ctrl-C to
-        return what there is, with a warning, instead of raising it with the exception.
+        ``max_step``, their longest step; ``threads`` (by default one per core); ``progress``, True
+        for a progress bar, False for none, or a function that gets the state of the work as a text (by
+        default a bar after 2 s in a terminal or a notebook); ``partial``, after Ctrl-C to return what there
+        is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -165,8 +166,6 @@ def bifurcation(
     >>> found["period"].values.squeeze().tolist()
     [4, 2, 2, 2]
     """
-    from tqdm import tqdm
-
     xarray = require_xarray()
     axis = parameter_values(model, parameter, values)
     n, transient = whole("n", n, 12 if attractors else 1), whole("transient", transient, 0)
@@ -199,8 +198,7 @@ def bifurcation(
             one = runner(rows[these], states, transient, n)
         put(found, these, one)
 
-    shown = sys.stderr.isatty() if chosen["progress"] is None else chosen["progress"]
-    with tqdm(total=places.size, unit="run", disable=not shown, leave=False) as bar:
+    with progress_bar(places.size, "run", chosen["progress"], title="bifurcation") as bar:
         added = perturbation(judge.coordinates.size, nudge)
         stopped = run_in_order(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
     if not stopped:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
@@ -83,7 +83,7 @@ def lyapunov(
     atol: float = 1e-10,
     max_step: float | None = None,
     threads: int | None = None,
-    progress: bool | None = None,
+    progress: bool | Callable[[str], object] | None = None,
     with_error: bool = False,
 ) -> Any:
     """The largest Lyapunov exponent: the mean rate at which neighbouring orbits part.
@@ -111,8 +111,9 @@ def lyapunov(
         The longest step, as for :func:`udd.simulate`.
     threads : int, optional
         How many threads to use, by default one per core. No bit of the result depends on it.
-    progress : bool, optional
-        Whether to show a progress bar on stderr; by default for long arrays, where stderr is a terminal.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
     with_error : bool
         Whether to return the standard error too.
 
@@ -185,11 +186,11 @@ def lyapunov(
     exponents, errors = np.empty(n), np.empty(n if with_error else 0)
     missed, worst = 0, 0.0
     outcomes: list[int] = []
-    with progress_bar(n, "exponents", progress) as show:
+    with progress_bar(n, "exponent", progress) as bar:
         for first in range(0, n, PORTION):
             part = slice(first, min(first + PORTION, n))
             rows = orbits.rows(part)
-            batch = Batch(model, rows, start[None, :], rtol, atol, workers, show(first), longest)
+            batch = Batch(model, rows, start[None, :], rtol, atol, workers, bar.since(first), longest)
             found = _core.lyapunov(batch, False, time, skipped, goal)
             if first == 0:
                 warn_of_some(model, rows, found["end"], min(time, LOOK * time_scale), rtol, atol)

@@ -9,6 +9,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from udd._util.atomic_files import made_folder
+from udd._util.progress import status
 from udd.discovery import Discovery, discover
 from udd.models import Disk
 from udd.tracking import track
@@ -31,8 +32,7 @@ def demo(
     out: str | os.PathLike[str],
     *,
     null: bool = False,
-    progress: Callable[[str], None] | None = None,
-    bar: bool = False,
+    progress: bool | Callable[[str], object] | None = None,
 ) -> Demo:
     """Track the sample film, find what the model lacks, write the measurement and the page.
 
@@ -42,10 +42,9 @@ def demo(
         Folder to write to; made if it is not there.
     null : bool
         Take the film of a disk that lacks nothing.
-    progress : callable, optional
-        Told in a few words what is being done.
-    bar : bool
-        Show a progress bar while tracking.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
 
     Returns
     -------
@@ -56,15 +55,14 @@ def demo(
     UddError
         The folder cannot be written to.
     """
-    tell = progress or (lambda _text: None)
     folder, name = made_folder(out), "sample_null" if null else "sample"
     stem = "_null" if null else ""
     table, page = folder / f"measurement{stem}.csv", folder / f"report{stem}.html"
     with as_file(files("udd") / "demo" / f"{name}.mp4") as film:
-        tell("tracking the film")
-        measurement = track(film, disk_radius=R, progress=bar).with_meta(W=W)
+        measurement = track(film, disk_radius=R, progress=progress).with_meta(W=W)
         measurement.to_csv(table)
-        found = discover(measurement, Disk(W, R=R), progress=tell)
-        tell("writing the page")
+        with status(progress) as tell:
+            found = discover(measurement, Disk(W, R=R), progress=tell)
+            tell("writing the page")
         found.report(page, film=film, command="udd demo" + (" --null" if null else ""))
     return Demo(found, table, page)

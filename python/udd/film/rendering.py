@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
@@ -13,8 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed, with_defaults
 from udd._util.memory import require_memory
+from udd._util.one_line import link_to
+from udd._util.progress import Progress, progress_bar
 from udd._util.random_generator import Rng, generator
 from udd.errors import UddError
 from udd.measurement import Measurement
@@ -32,8 +35,8 @@ from .sprite import Patch
 _COARSE = 0.25  # pixels
 
 
-@dataclass(frozen=True)
-class Film:
+@dataclass(frozen=True, repr=False)
+class Film(Drawable):
     """A film and what it shows.
 
     Attributes
@@ -66,6 +69,14 @@ class Film:
     pivot: tuple[float, float]
     radius: float
 
+    def __repr__(self) -> str:
+        lasts = f", {self.t[-1] - self.t[0]:.4g} s" if len(self.t) else ""
+        width, height = self.size
+        return f"<Film {self.path}: {len(self.t)} frames{lasts}, {width} x {height} pixels>"
+
+    def _repr_html_(self) -> str:
+        return link_to(self.path, repr(self)[1:-1].rpartition(": ")[2])
+
     @property
     def truth(self) -> Measurement:
         """What a perfect tracker would measure: Y, Z, beta in the middle of each exposure."""
@@ -87,7 +98,7 @@ def render(
     defects: Defects | None = None,
     layout: Sequence[Mapping[str, Any]] | None = None,
     rng: Rng = 0,
-    progress: bool = False,
+    progress: bool | Callable[[str], object] | None = None,
     **camera: Unpack[CameraOptions],
 ) -> Film:
     """Film a simulated run: what a camera before the device would see.
@@ -127,8 +138,9 @@ def render(
         "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given); sides upright at beta = 0.
     rng : int, Generator or None
         Of the noise. The same whole number gives the same film; None takes fresh entropy.
-    progress : bool
-        Show a progress bar.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
     **camera
         ``fps`` (25), frames per second; ``exposure`` (0.010), the time in s for which the shutter is open,
         at most ``1 / fps``; ``size`` ((550, 700)), width and height of the picture in pixels, both even;
@@ -223,19 +235,19 @@ def _frames(
     numbers: NDArray[np.intp],
     defects: Defects,
     noise: Noise,
-    progress: bool,
+    progress: Progress,
 ) -> Iterator[NDArray[np.uint8]]:
-    from tqdm import tqdm
-
     last: NDArray[np.uint8] | None = None
-    for number in tqdm(numbers.tolist(), desc="film", unit="frame", disable=not progress):
-        if number not in defects.repeated or last is None:
-            last = noise.on(scene.expose(motion, float(times[number]), float(stamps[number])))
-            if defects.mirrored:
-                last = np.ascontiguousarray(last[:, ::-1])
-            if defects.turned:
-                last = np.ascontiguousarray(np.rot90(last, -defects.turned))
-        yield np.zeros_like(last) if number in defects.black else last
+    with progress_bar(len(numbers), "frame", progress, title="film") as bar:
+        for number in numbers.tolist():
+            if number not in defects.repeated or last is None:
+                last = noise.on(scene.expose(motion, float(times[number]), float(stamps[number])))
+                if defects.mirrored:
+                    last = np.ascontiguousarray(last[:, ::-1])
+                if defects.turned:
+                    last = np.ascontiguousarray(np.rot90(last, -defects.turned))
+            yield np.zeros_like(last) if number in defects.black else last
+            bar.update()
 
 
 def _patches(layout: Sequence[Mapping[str, Any]] | None, radius: float) -> list[Patch] | None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from udd._util.atomic_files import made_folder, write_whole
+from udd._util.one_line import OneLine, link_to
+from udd._util.progress import status
 from udd.errors import UddError
 
 from . import page
@@ -18,8 +20,8 @@ from .shared_films import Lab
 _DPI = 150
 
 
-@dataclass(frozen=True)
-class Drawn:
+@dataclass(frozen=True, repr=False)
+class Drawn(OneLine):
     """A figure as a picture.
 
     Attributes
@@ -39,8 +41,8 @@ class Drawn:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Checked:
+@dataclass(frozen=True, repr=False)
+class Checked(OneLine):
     """A claim and what has become of it.
 
     Attributes
@@ -56,7 +58,7 @@ class Checked:
     seconds: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Reproduction:
     """What :func:`reproduce` made.
 
@@ -75,13 +77,21 @@ class Reproduction:
     claims: tuple[Checked, ...]
     left_out: tuple[Figure | Claim, ...] = ()
 
+    def __repr__(self) -> str:
+        holds = sum(own.verdict.verdict == "holds" for own in self.claims)
+        text = f"{len(self.figures)} figures, {len(self.claims)} claims, {holds} of which hold"
+        return f"<Reproduction {self.page}: {text}>"
+
+    def _repr_html_(self) -> str:
+        return link_to(self.page, repr(self)[1:-1].rpartition(": ")[2])
+
 
 def reproduce(
     out: str | os.PathLike[str],
     *,
     only: Iterable[str] | None = None,
     films: bool = True,
-    progress: Callable[[str], None] | None = None,
+    progress: bool | Callable[[str], object] | None = None,
 ) -> Reproduction:
     """Draw the paper's figures, check its claims, and write the page.
 
@@ -94,8 +104,9 @@ def reproduce(
         Keys of figures and claims (see :data:`FIGURES`, :data:`CLAIMS`); by default all.
     films : bool
         Whether to make the figures and check the claims that need films, which takes minutes the first time.
-    progress : callable, optional
-        Told in a few words what is being done.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
 
     Returns
     -------
@@ -115,11 +126,24 @@ def reproduce(
     'holds'
     """
     chosen_figures, chosen_claims, left_out = _chosen(only, films)
-    tell = progress or (lambda _text: None)
     folder = made_folder(out)
+    with status(progress) as tell:
+        drawn, checked = _worked(folder, chosen_figures, chosen_claims, tell)
+    target = folder / "index.html"
+    write_whole(target, page.render(drawn, checked, left_out).encode())
+    return Reproduction(target, tuple(drawn), tuple(checked), tuple(left_out))
+
+
+def _worked(
+    folder: Path,
+    figures: Sequence[Figure],
+    claims: Sequence[Claim],
+    tell: Callable[[str], None],
+) -> tuple[list[Drawn], list[Checked]]:
+    """Draw the figures, and check the claims."""
     lab = Lab(folder / "films", tell)
     drawn = []
-    for one in chosen_figures:
+    for one in figures:
         tell(f"drawing {one.key}")
         start = time.perf_counter()
         path = folder / f"{one.key}.{'svg' if one.vector else 'png'}"
@@ -127,13 +151,11 @@ def reproduce(
         write_whole(path, page.svg(picture) if one.vector else page.png(picture, _DPI))
         drawn.append(Drawn(one, path, picture.get_figwidth(), time.perf_counter() - start))
     checked = []
-    for own in chosen_claims:
+    for own in claims:
         tell(f"checking {own.key}")
         start = time.perf_counter()
         checked.append(Checked(own, own.check(lab), time.perf_counter() - start))
-    target = folder / "index.html"
-    write_whole(target, page.render(drawn, checked, left_out).encode())
-    return Reproduction(target, tuple(drawn), tuple(checked), tuple(left_out))
+    return drawn, checked
 
 
 def _chosen(

@@ -54,8 +54,9 @@ class RunOptions(TypedDict, total=False):
         The longest step; by default only the error limits it.
     threads : int, optional
         By default one per core. No result depends on it.
-    progress : bool, optional
-        Whether to show a progress bar on stderr; by default where that is a terminal.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
     partial : bool
         After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
     """
@@ -64,7 +65,7 @@ class RunOptions(TypedDict, total=False):
     atol: float
     max_step: float | None
     threads: int | None
-    progress: bool | None
+    progress: bool | Callable[[str], object] | None
     partial: bool
 
 

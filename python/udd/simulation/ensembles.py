@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
 from udd.errors import ModelError, interrupted
@@ -32,7 +33,7 @@ __all__ = ["Ensemble", "ensemble"]
 
 
 @dataclass(frozen=True, eq=False)
-class Ensemble:
+class Ensemble(Drawable):
     """Many runs of one model at common times.
 
     Attributes
@@ -95,7 +96,7 @@ def ensemble(
     max_step: float | None = None,
     method: str = "auto",
     threads: int | None = None,
-    progress: bool | None = None,
+    progress: bool | Callable[[str], object] | None = None,
     partial: bool = False,
     inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
 ) -> Ensemble:
@@ -118,8 +119,9 @@ def ensemble(
         As for :func:`udd.simulate`; ``"auto"`` is the fastest at equal error.
     threads : int, optional
         How many threads to use, by default one per core. No bit of the result depends on it.
-    progress : bool, optional
-        Whether to show a progress bar on stderr; by default for many runs, where stderr is a terminal.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
     partial : bool
         After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
     inputs
@@ -171,8 +173,8 @@ def ensemble(
     stepper = method_for(model, method, rtol)
     if stepper == "rodas":
         raise ModelError('method="rodas" is for single runs, by udd.simulate')
-    with progress_bar(runs, "run", progress) as since:
-        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), since(0), longest)
+    with progress_bar(runs, "run", progress) as bar:
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), bar.since(), longest)
         found = _core.ensemble(batch, times, stepper)
     names = np.array(OUTCOMES)[found["outcome"]]
     states = found["states"][:, wanted]

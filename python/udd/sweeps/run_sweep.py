@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-import sys
 import warnings
+from collections.abc import Callable
 from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from udd._util.arguments import checked_arguments
+from udd._util.progress import progress_bar
 from udd.errors import IncompleteWarning, ModelError, interrupted
 
 from .chunks import grid_of
@@ -30,7 +31,7 @@ def sweep(
     executor: Executor | None = None,
     store: str | os.PathLike[str] | zarr.Group | None = None,
     *,
-    progress: bool | None = None,
+    progress: bool | Callable[[str], object] | None = None,
     partial: bool = False,
 ) -> xr.Dataset:
     """Compute a quantity over a grid of parameters and initial states, chunk by chunk.
@@ -45,8 +46,9 @@ def sweep(
     store : path or zarr.Group, optional
         Where the result is written, chunk by chunk as it is found; the workers must reach it. A sweep that
         stopped goes on from there. Without one the result is held in memory.
-    progress : bool, optional
-        Whether to show a progress bar on stderr; by default where that is a terminal.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
     partial : bool
         After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
 
@@ -107,17 +109,14 @@ def sweep(
         raise ModelError(f"a sweep needs a udd.SweepSpec, not {spec!r}")
     if executor is not None and not hasattr(executor, "submit"):
         raise ModelError(f"an executor needs a method submit, which {executor!r} lacks")
-    from tqdm import tqdm
-
     grid = grid_of(spec)
     # An executor has a worker for every core; alone, this process has them all.
     threads = 0 if executor is None else 1
     result = Memory(spec, grid, threads) if store is None else SweepStore(store, spec, grid, threads)
     done = result.done()
     sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
-    shown = sys.stderr.isatty() if progress is None else progress
     why, stopped = "some of the workers do not reach the store", False
-    with tqdm(total=sum(sizes), initial=int(done @ sizes), unit="run", disable=not shown, leave=False) as bar:
+    with progress_bar(sum(sizes), "run", progress, title="sweep", initial=int(done @ sizes)) as bar:
 
         def keep(chunk: int, found: Any) -> None:
             result.keep(chunk, found)

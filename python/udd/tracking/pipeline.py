@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
+from udd._util.progress import Count, Progress, progress_bar
 from udd.calibration_items import Calibrate
 from udd.errors import outside
 from udd.markers.layout import Layout
@@ -75,7 +77,7 @@ def track(
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
     bob: str | Sequence[int] | None = None,
     config: Config | TrackOptions | None = None,
-    progress: bool = False,
+    progress: bool | Callable[[str], object] | None = None,
     **more: Unpack[MoreOptions],
 ) -> Measurement:
     """Measure the motion of a disk with coloured marks in a film.
@@ -108,8 +110,9 @@ def track(
         picture's vertical, about the centre of the bob's path (or `pivot`).
     config : path, mapping or TrackOptions, optional
         A TOML file (or what would stand in one) with any of these arguments; what is given here wins.
-    progress : bool
-        Show a progress bar.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
     **more
         ``mark_distance``: of the marks' centres from the disk's centre [m]. If not given, 65/80 of the radius
         where the film agrees with that to 1.5 %, otherwise the rim alone sets the scale.
@@ -178,7 +181,7 @@ def run_tracker(
     video: str | os.PathLike[str],
     *,
     config: Config | TrackOptions | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     watch: Watch | None = None,
     **given: Any,
 ) -> Tracking | Measurement:
@@ -196,7 +199,7 @@ def run_tracker(
 def track_disk(
     video: str | os.PathLike[str],
     *,
-    progress: bool = False,
+    progress: Progress = False,
     watch: Watch | None = None,
     **given: Any,
 ) -> Tracking:
@@ -207,13 +210,11 @@ def track_disk(
     return found
 
 
-def _bar(film: Film, frames: int, verb: str, progress: bool) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(total=frames, unit="frame", desc=f"{verb} {film.path.name}", disable=not progress)
+def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractContextManager[Count]:
+    return progress_bar(frames, "frame", progress, title=f"{verb} {film.path.name}", leave=True)
 
 
-def _track_marks(film: Film, options: TrackOptions, progress: bool, watch: Watch | None) -> Tracking:
+def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
     """Coloured marks: survey, calibrate, follow, refine, to metres, flags."""
     look_over, camera = _steadied(film)
     there = recognise(film, look_over, options)
@@ -241,7 +242,7 @@ def _steadied(film: Film) -> tuple[Survey, CameraMotion | None]:
     return replace(look_over, bursts=[[correct(p) for p in burst] for burst in look_over.bursts]), camera
 
 
-def _track_tags(film: Film, options: TrackOptions, progress: bool, watch: Watch | None) -> Tracking:
+def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
     """Printed tags: each frame by itself, in one pass."""
     frames = film.promised or film.packets
     with _bar(film, frames, "track", progress) as bar:
@@ -252,7 +253,7 @@ def _track_tags(film: Film, options: TrackOptions, progress: bool, watch: Watch 
 
 
 def _teller(
-    film: Film, look: DiskAppearance, frames: int, bar: Any, watch: Watch | None
+    film: Film, look: DiskAppearance, frames: int, bar: Count, watch: Watch | None
 ) -> Callable[[Picture, Pose], None]:
     """What a pass calls after each picture: the progress bar moves, and `watch` is told."""
 
@@ -388,12 +389,12 @@ def _rim_upright(
         return replace(rim, centre=0j)
 
 
-def _follow(film: Film, known: TrackerState, frames: int, progress: bool, watch: Watch | None) -> Tracks:
+def _follow(film: Film, known: TrackerState, frames: int, progress: Progress, watch: Watch | None) -> Tracks:
     with _bar(film, frames, "track", progress) as bar:
         return follow(film.pictures(), known, _teller(film, known.look, frames, bar, watch))
 
 
-def _refine(film: Film, known: TrackerState, tracks: Tracks, progress: bool) -> Tracks:
+def _refine(film: Film, known: TrackerState, tracks: Tracks, progress: Progress) -> Tracks:
     streaks = (tracks.streak > LONG).any() or any(is_lost(flag) for flag in tracks.flag)
     for streaks_only in (False, True) if streaks else (False,):
         with _bar(film, len(tracks), "refine", progress) as bar:

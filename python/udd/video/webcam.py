@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, islice, tee
@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
+from udd._util.one_line import link_to
+from udd._util.progress import Progress, progress_bar
 from udd._util.validation import number
 
 from .reader import TrackError
@@ -48,7 +50,7 @@ class Source(Protocol):
         """Let go of the camera."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
     """A film that was recorded, and what was lost."""
 
@@ -72,6 +74,12 @@ class Recording:
         """How many frames are missing in the gaps."""
         return int(np.sum(np.round(np.diff(self.gaps)[:, 0] / self.interval) - 1))
 
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {self}>"
+
+    def _repr_html_(self) -> str:
+        return link_to(self.path, str(self))
+
     def __str__(self) -> str:
         """What was recorded, in one sentence."""
         rate, last = 1 / self.interval, self.t[-1]
@@ -86,7 +94,11 @@ class Recording:
 
 @checked_arguments
 def record(
-    path: str | os.PathLike[str], *, camera: int | Source = 0, seconds: float = 20.0, progress: bool = False
+    path: str | os.PathLike[str],
+    *,
+    camera: int | Source = 0,
+    seconds: float = 20.0,
+    progress: bool | Callable[[str], object] | None = None,
 ) -> Recording:
     """Record a film from a webcam, with the time at which each frame was taken.
 
@@ -98,8 +110,9 @@ def record(
         Number of the camera (0: the first), or an opened one, set up as you like; it is released.
     seconds : float
         How long to record [s].
-    progress : bool
-        Show a progress bar.
+    progress : bool or callable, optional
+        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
+        bar shows after 2 s in a terminal or a notebook.
 
     Returns
     -------
@@ -205,20 +218,18 @@ class Stop:
 class _Shots:
     """Frames of a camera with their times, until the time is over or the camera stops."""
 
-    def __init__(self, source: Source, name: str, seconds: float, progress: bool, by_hand: Stop) -> None:
+    def __init__(self, source: Source, name: str, seconds: float, progress: Progress, by_hand: Stop) -> None:
         self.by_hand = by_hand
         self.source, self.name, self.seconds, self.progress = source, name, seconds, progress
         self.t: list[float] = []
         self.clock = "camera"
 
     def __iter__(self) -> Iterator[tuple[float, NDArray[np.uint8]]]:
-        from tqdm import tqdm
-
         raw = self._raw()
         probe = list(islice(raw, PROBE))
         if np.any(np.diff([own for own, _, _ in probe]) <= 0):  # it knows no time, or not for each frame
             self.clock = "computer"
-        with tqdm(total=self.seconds, unit="s", desc=f"record {self.name}", disable=not self.progress) as bar:
+        with progress_bar(self.seconds, "s", self.progress, title=f"record {self.name}", leave=True) as bar:
             for own, arrived, picture in chain(probe, raw):
                 t = own if self.clock == "camera" else arrived
                 if self.t and t - self.t[-1] < 1 / (RATE * TICKS):
