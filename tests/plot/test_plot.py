@@ -147,7 +147,7 @@ def test_the_residual_of_a_right_model_has_no_pattern() -> None:
 def test_evidence_stands_beside_what_chance_reaches() -> None:
     found = discovered.disk()
     ax = udd.plot.evidence(found)
-    titles = [tick.get_text() for tick in ax.get_yticklabels()]
+    titles = [tick.get_text().replace("\n", " ") for tick in ax.get_yticklabels()]
     assert found.effects[0].title in titles
     (line,) = [x for x in ax.lines if x.get_linestyle() == "--"]
     limit = line.get_xdata()[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -34,15 +33,17 @@ def require_writable(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     UddError
-        There is no such folder, it may not be written to, or the path is a folder.
+        There is no such folder, no file can be made in it, or the path is a folder.
     """
     target = Path(path)
     if target.is_dir():
         raise UddError(f"{target} is a folder, not a file to write to")
     if not target.parent.is_dir():
         raise UddError(f"{target}: there is no folder {target.parent}")
-    if not os.access(target.parent, os.W_OK):
-        raise UddError(f"{target} cannot be written: {os.strerror(errno.EACCES)}")
+    try:  # rights alone do not say it: a file system may be full, read-only, or refuse the name
+        os.unlink(_new_file(target, ""))
+    except OSError as error:
+        raise UddError(f"{target} cannot be written: {error.strerror}") from None
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import optimize
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
@@ -32,7 +33,7 @@ _SHORTEST = 1e-5  # step
 
 
 @dataclass(frozen=True, eq=False)
-class Locus:
+class Locus(Drawable):
     """Bifurcation points of one kind over two parameters.
 
     Attributes

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.drawable import Drawable
 from udd.errors import ModelError
 from udd.models import Model
 
@@ -25,7 +26,7 @@ AnyCurve = EquilibriumCurve | PeriodicOrbitCurve
 
 
 @dataclass(frozen=True, eq=False)
-class BifurcationPoint:
+class BifurcationPoint(Drawable):
     """Where a branch changes.
 
     Attributes
@@ -91,7 +92,7 @@ class BifurcationPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Drawable):
     """A family of equilibria or cycles over a parameter, in the order in which the curve was followed.
 
     Attributes

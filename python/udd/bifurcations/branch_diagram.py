@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed
 from udd.attractors.arguments import parameter_values
 from udd.attractors.bifurcation_diagram import bifurcation
@@ -33,7 +34,7 @@ _BORN = ("Hopf", "symmetry breaking", "period doubling", "branch point")
 
 
 @dataclass(frozen=True, eq=False)
-class Diagram:
+class Diagram(Drawable):
     """Section points, branches and bifurcation points over one parameter.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch
@@ -29,7 +30,7 @@ _AHEAD = 1e-6  # of the parameter, for differences of the conditions at the ends
 
 
 @dataclass(frozen=True, eq=False)
-class Connection:
+class Connection(Drawable):
     """An orbit that takes for ever to leave an equilibrium and for ever to arrive.
 
     Attributes

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.memory import require_memory
 from udd._util.validation import whole
 from udd.errors import IncompleteWarning, IntegrationError, ModelError
@@ -47,7 +48,7 @@ _ASIDE = 1e-5  # relative: so far from the crisis the attractor is looked at
 
 
 @dataclass(frozen=True, eq=False)
-class Crisis:
+class Crisis(Drawable):
     """Where a chaotic attractor meets a saddle cycle.
 
     Attributes

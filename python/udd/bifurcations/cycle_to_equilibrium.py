@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch, cycles_of
@@ -36,7 +37,7 @@ _STEPS = 50
 
 
 @dataclass(frozen=True, eq=False)
-class CycleConnection:
+class CycleConnection(Drawable):
     """An orbit between an equilibrium and a saddle cycle.
 
     Attributes

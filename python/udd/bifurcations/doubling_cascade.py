@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.validation import whole
 from udd.errors import IntegrationError, ModelError
 
@@ -29,7 +30,7 @@ _KNOWN = 3  # doublings, whose spacings say where the next one is
 
 
 @dataclass(frozen=True, eq=False)
-class Cascade:
+class Cascade(Drawable):
     """Period doublings that follow one another.
 
     Attributes

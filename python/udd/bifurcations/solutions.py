@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.drawable import Drawable
 from udd._util.memory import require_memory
 from udd._util.validation import whole
 from udd.models import Model, beyond_the_edge
@@ -58,7 +59,7 @@ def kind_of_rest(eigenvalues: Complex) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class Equilibrium(Drawable):
     """A state at which nothing changes but angles that nothing depends on.
 
     Attributes
@@ -103,7 +104,7 @@ class Equilibrium:
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodicOrbit:
+class PeriodicOrbit(Drawable):
     """A cycle of a model.
 
     Attributes

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed
 from udd._util.validation import array, number
 from udd.errors import ModelError
@@ -27,7 +28,7 @@ _ROUND = 800  # states that show a cycle
 
 
 @dataclass(frozen=True, eq=False)
-class Lifetimes:
+class Lifetimes(Drawable):
     """How long motions last before they settle.
 
     Attributes

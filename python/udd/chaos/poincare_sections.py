@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import with_defaults
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
@@ -41,7 +42,7 @@ CLOCKS = 100.0  # typical times that a crossing may take on average
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class Section(Drawable):
     """Crossings of a surface, or of several, along one orbit or many.
 
     Attributes
@@ -266,9 +267,10 @@ def poincare(
     **options
         ``rtol`` (1e-9) and ``atol`` (1e-12, less for starts below 1e-3), the tolerances of the run;
         ``max_step``, its longest step; ``threads`` (by default one per core; the result does not depend on
-        it); ``progress``, whether to show a progress bar (by default for many orbits in a terminal);
-        ``partial``, after Ctrl-C to return what there is, with a warning, instead of raising it with the
-        exception.
+        it); ``progress``, True
+        for a progress bar, False for none, or a function that gets the state of the work as a text (by
+        default a bar after 2 s in a terminal or a notebook); ``partial``, after Ctrl-C to return what there
+        is, with a warning, instead of raising it with the exception.
 
     Returns
     -------
@@ -323,8 +325,8 @@ def poincare(
     else:
         end = number("t_max", t_max, above=0.0)
     jobs = max(len(rows), len(starts))
-    with progress_bar(jobs, "orbit", chosen["progress"]) as since:
-        batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), since(0), longest)
+    with progress_bar(jobs, "orbit", chosen["progress"]) as bar:
+        batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), bar.since(), longest)
         found = _core.sections(batch, list(zip(surfaces, ways, strict=True)), skipped, count, end)
     names = np.array(OUTCOMES)[found["outcome"]]
     numbers = found["found"].astype(np.int64)

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.memory import require_memory
+from udd._util.one_line import OneLine
 from udd._util.validation import number, whole
 from udd.errors import ConvergenceWarning, IntegrationError
 from udd.models import DLE, Model, require_model
@@ -42,7 +44,7 @@ _FAR = 1e6  # times its start, or from 0: a run that fails there has gone to inf
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(Drawable):
     """The Lyapunov exponents of an orbit.
 
     Attributes
@@ -381,8 +383,8 @@ def _invariants(model: Model, exponents: _Floats, mean: _Floats, product: _Float
     return {} if averages is None else averages(model, exponents, mean, product)
 
 
-@dataclass(frozen=True, eq=False)
-class Covariant:
+@dataclass(frozen=True, eq=False, repr=False)
+class Covariant(Drawable, OneLine):
     """The covariant Lyapunov vectors along an orbit, and the exponents of finite times.
 
     Attributes

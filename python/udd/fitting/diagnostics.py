@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd import _core
+from udd._util.one_line import OneLine
 from udd._util.small_units import small_unit
 
 from .input_noise import LEVELS_APART, NoisyInput, diffusion_by_noise, noisy_inputs
@@ -75,8 +76,8 @@ class RunawayParameter:
         )
 
 
-@dataclass(frozen=True)
-class Reading:
+@dataclass(frozen=True, repr=False)
+class Reading(OneLine):
     """What a channel's frames are good to.
 
     Attributes

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._util.angles import wrapped
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed
 from udd._util.memory import require_memory
 from udd._util.progress import thread_count
@@ -53,7 +54,7 @@ _GROWTH_TIME = 4000.0  # over which the exponent is averaged; its error is then 
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(Drawable):
     """What is expected to be seen, with the fan of an ensemble.
 
     Attributes

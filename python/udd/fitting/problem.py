@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed, renamed_attribute
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
@@ -100,7 +101,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Drawable):
     """A model fitted to a measurement, or to several.
 
     Attributes

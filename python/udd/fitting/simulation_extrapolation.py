@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
+from udd._util.one_line import OneLine
 from udd._util.validation import whole
 from udd.errors import FitError
 from udd.measurement import InputSignal, Measurement
@@ -26,8 +28,8 @@ _TIMES, _BACK = (1.0, 2.0), (3.0, -3.0, 1.0)
 _FEWEST = 2  # of the draws, that must end
 
 
-@dataclass(frozen=True)
-class InputBias:
+@dataclass(frozen=True, repr=False)
+class InputBias(Drawable, OneLine):
     """Bias by the inputs' noise, estimated by simulation extrapolation.
 
     Attributes

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from udd._util.keywords import renamed
+from udd._util.one_line import OneLine
 from udd._util.validation import number
 from udd.errors import FitError
 
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 _CAMERA, _NOISE, _MODEL = "camera", "noise", "model error"
 
 
-@dataclass(frozen=True)
-class Budget:
+@dataclass(frozen=True, repr=False)
+class Budget(OneLine):
     """From what the uncertainty of each fitted number comes.
 
     Attributes

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.drawable import Drawable
 from udd.errors import MeasurementError
 
 __all__ = ["Hold", "InputSignal", "input_signals"]
@@ -18,7 +19,7 @@ Hold = Literal["zero", "linear", "cubic"]
 
 
 @dataclass(frozen=True, eq=False)
-class InputSignal:
+class InputSignal(Drawable):
     """A measured input (exogenous signal): samples, and how it runs between them.
 
     Parameters

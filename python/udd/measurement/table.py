@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.labelled import dataset
 from udd.errors import MeasurementError
 
@@ -32,7 +33,7 @@ SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any mo
 
 
 @dataclass(frozen=True, eq=False)
-class Measurement:
+class Measurement(Drawable):
     """A measured motion: of a disk or a pendulum as a camera saw it, or of a user's own model.
 
     Parameters

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
-from .style import AXES, FAINT, MANY, MEASURED, SHADES, new_axes, tidy
+from .style import AXES, FAINT, MANY, MEASURED, SHADES, SQUARE, WIDE, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +119,7 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
     titles = [str(title) for title in result["ending"].to_numpy()]
     ends, shades = _ends(result, titles).transpose(up, across).to_numpy(), _shades(titles)
     (x_words, x_unit, x_factor), (y_words, y_unit, y_factor) = _axis(result, across), _axis(result, up)
-    ax = new_axes(ax)
+    ax = new_axes(ax, size=SQUARE if x_unit == y_unit != "1" else WIDE)
     ax.pcolormesh(
         x_factor * result[across].to_numpy(),
         y_factor * result[up].to_numpy(),
@@ -136,7 +136,7 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.plot([], [], "s", color=shade, markeredgecolor=MEASURED, markeredgewidth=0.5, label=said)
     ax.set_xlabel(f"{x_words} at the start [{x_unit}]")
     ax.set_ylabel(f"{y_words} at the start [{y_unit}]")
-    ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
+    legend_above(ax, fontsize="small")
     if x_unit == y_unit != "1":
         ax.set_aspect("equal")
     tidy(ax, grid=False)
@@ -216,20 +216,19 @@ def _layers(
 
 
 def _shades(titles: list[str]) -> list[Any]:
-    """Colours that can be told apart; attractors in matplotlib's own, other ends in greys and black."""
+    """Colours that all readers distinguish: attractors in the palette, other ends in greys and black.
+
+    More attractors than the palette has colours take steps of cividis, which are distinct by lightness alone.
+    """
     import matplotlib
 
     count = sum(title.startswith("attractor") for title in titles)
-    own = (
-        matplotlib.colormaps["tab10" if count <= 10 else "tab20"]
-        if count <= 20
-        else matplotlib.colormaps["turbo"]
-    )
+    steps = matplotlib.colormaps["cividis"]
     greys = {"ejected": "#000000", "escaped": "#3d3d3d", "undecided": "#d9d9d9"}
     shades: list[Any] = []
     for k, title in enumerate(titles):
         if title.startswith("attractor"):
-            shades.append(own(k) if count <= 20 else own(k / (count - 1)))
+            shades.append(SHADES[k] if count <= len(SHADES) else steps(k / (count - 1)))
         else:
             shades.append(greys.get(title, "#ffffff"))
     return shades
@@ -242,9 +241,5 @@ def _legend(ax: Axes) -> None:
     if unique:
         from matplotlib.lines import Line2D
 
-        legend = ax.legend(
-            unique.values(), unique.keys(), frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0)
-        )
-        for handle in legend.legend_handles:
-            if isinstance(handle, Line2D):
-                handle.set_markersize(5)
+        sizes = [handle.get_markersize() for handle in unique.values() if isinstance(handle, Line2D)]
+        legend_above(ax, list(unique.values()), list(unique), markerscale=5.0 / max(sizes, default=5.0))

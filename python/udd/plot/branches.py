@@ -9,7 +9,7 @@ import numpy as np
 
 from udd.errors import UddError
 
-from .style import FAINT, axis_of, new_axes, tidy
+from .style import FAINT, axis_of, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -244,5 +244,4 @@ def _legend(ax: Axes) -> None:
     if first:
         words = sorted(first, key=labels.index)
         # Above the picture: inside it would cover a branch, wherever it stands.
-        above: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
-        ax.legend([first[text] for text in words], words, frameon=False, fontsize="small", ncols=3, **above)
+        legend_above(ax, [first[text] for text in words], words, fontsize="small")

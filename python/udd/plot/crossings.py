@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from udd.errors import UddError
 
-from .style import AFTER, FAINT, MANY, SHADES, axis_of, label, new_axes, tidy
+from .style import AFTER, FAINT, MANY, SHADES, SQUARE, axis_of, label, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,9 +57,7 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
     ax.set_xlabel(across)
     ax.set_ylabel(up)
     if len(result.section) > 1:
-        legend = ax.legend(frameon=False)
-        for handle in legend.legend_handles:
-            handle.set_markersize(5)  # type: ignore[union-attr]
+        legend_above(ax, markerscale=5.0 / ax.lines[0].get_markersize())
     tidy(ax)
     return ax
 
@@ -100,7 +98,7 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
     said, factor = axis_of(result.model, name)
     x, following = factor * x.ravel(), factor * following.ravel()
     there = np.isfinite(x) & np.isfinite(following)
-    ax = new_axes(ax)
+    ax = new_axes(ax, size=SQUARE)
     if there.any():
         ends = [float(x[there].min()), float(x[there].max())]
         ax.plot(ends, ends, color=FAINT, linewidth=1.0, zorder=0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .inputs import require
-from .style import AFTER, ALIKE, AXES, BEFORE, FLOOR, MEASURED, new_axes, tidy
+from .style import AFTER, ALIKE, AXES, BEFORE, FLOOR, MEASURED, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,7 +85,7 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     )
     ax.set_xlabel(label)
     ax.set_ylabel(said)
-    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    legend_above(ax)
     tidy(ax)
     return ax
 
@@ -128,7 +128,7 @@ def _surface(curve: Any, ax: Axes) -> Axes:
     ax.figure.colorbar(shown, ax=ax, label=said)
     unsure = Patch(facecolor="none", edgecolor="black", hatch="///", label="0 lies in the 95 % band")
     been = Line2D([], [], color=MEASURED, linestyle="", marker=".", markersize=4, label="the record")
-    ax.legend(handles=[unsure, been], frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
+    legend_above(ax, [unsure, been], [str(unsure.get_label()), str(been.get_label())])
     ax.set_xlabel(first)
     ax.set_ylabel(second)
     ax.set_xlim(by * x[0], by * x[-1])

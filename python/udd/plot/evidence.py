@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,10 +11,13 @@ from udd._util.small_units import small_unit
 from udd.errors import UddError
 
 from .inputs import require
-from .style import AFTER, ALIKE, BEFORE, FAINT, FLOOR, new_axes, tidy
+from .style import AFTER, ALIKE, BEFORE, FAINT, FLOOR, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+_LINE = 34  # letters of a candidate's title in one line
 
 
 def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: int = 12) -> Axes:
@@ -36,7 +40,9 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
     if not 0 <= stage < len(discovery.scans):
         raise UddError(f"the discovery searched {len(discovery.scans)} times; there is no stage {stage}")
     scan = [s for s in discovery.scans[stage] if not s.absorbed][:most]
-    ax = new_axes(ax)
+    titles = [textwrap.fill(s.candidate.title, _LINE) for s in scan]
+    lines = sum(1.0 + 0.6 * title.count("\n") for title in titles)
+    ax = new_axes(ax, size=(8.0, 1.5 + 0.3 * lines))
     chosen = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
     seen: set[str] = set()
@@ -66,12 +72,12 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
         linewidth=1.2,
         label="what chance hardly reaches",
     )
-    ax.set_yticks(range(len(scan)), [s.candidate.title for s in scan])
+    ax.set_yticks(range(len(scan)), titles, fontsize="small")
     ax.set_ylim(max(len(scan), 1) - 0.4, -0.6)
     ax.set_xscale("log")
     ax.set_xlim(left=0.5)
     ax.set_xlabel("evidence: fall of χ² if this effect were added")
-    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
+    legend_above(ax)
     tidy(ax)
     ax.grid(False, axis="y")
     return ax
@@ -133,6 +139,6 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     )
     ax.set_xlabel("time since the model was let go [s]")
     ax.set_ylabel(f"median error [{unit}]")
-    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
+    legend_above(ax)
     tidy(ax)
     return ax

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from udd.errors import UddError
 
 from .inputs import first_film, require_fit
-from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, axis_of, label, new_axes, tidy
+from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, axis_of, label, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,7 +138,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     ax.axhline(0, color="black", linewidth=0.8)
     ax.set_xlabel(label("t"))
     ax.set_ylabel(f"{words}: measured − fitted [{unit}]")
-    ax.legend(frameon=False, loc="upper right", ncols=2)
+    legend_above(ax)
     tidy(ax)
     return ax
 

@@ -9,7 +9,7 @@ import numpy as np
 from udd.errors import UddError
 
 from .inputs import require
-from .style import AFTER, FAINT, MEASURED, label, new_axes, scale, tidy
+from .style import AFTER, FAINT, MEASURED, label, legend_above, new_axes, scale, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,6 +69,6 @@ def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
         ax.axvline(t[0] + result.valid_time, color="black", linestyle="--", linewidth=1, label="valid until")
     ax.set_xlabel("t" if of_own else label("t"))
     ax.set_ylabel(coordinate if of_own else label(coordinate))
-    ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=5)
+    legend_above(ax)
     tidy(ax)
     return ax

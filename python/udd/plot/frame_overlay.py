@@ -8,7 +8,7 @@ import numpy as np
 
 from udd.errors import UddError
 
-from .style import new_axes
+from .style import SQUARE, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes
 
     if not 0 <= frame < len(pixels.centre):
         raise UddError(f"there is no frame {frame}: the measurement has {len(pixels.centre)}")
-    ax = new_axes(ax)
+    ax = new_axes(ax, size=SQUARE)
     shown = np.asarray(image)
     ax.imshow(shown)
     u, v = pixels.centre[frame]

@@ -11,7 +11,7 @@ from udd.errors import UddError
 from udd.models import Model
 
 from .inputs import is_fit
-from .style import AFTER, FAINT, label, new_axes, tidy
+from .style import AFTER, FAINT, label, legend_above, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,7 +65,7 @@ def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = Non
     ax.set_xlim(0, top)
     ax.set_ylim(bottom=min(0.0, 1.1 * float(best.min())))
     if fit is not None:
-        ax.legend(frameon=False)
+        legend_above(ax)
     tidy(ax)
     return ax
 

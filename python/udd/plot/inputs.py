@@ -14,6 +14,8 @@ from udd.models.compiled import CompiledModel
 from udd.models.profile import ModelProfile
 from udd.models.registry import COMPILED
 
+from .style import AXES, label
+
 Array = NDArray[np.float64]
 
 #: The models whose motions are drawn, by the number of their states; of as many the first is meant.
@@ -54,8 +56,41 @@ class Motion:
 
     @property
     def time(self) -> str:
-        """The symbol of its time, which may have no unit."""
-        return "t" if self.profile.dynamics.time_unit else "tau"
+        """The label of its time."""
+        return "t" if self.is_own else label("t" if self.profile.dynamics.time_unit else "tau")
+
+    @property
+    def is_own(self) -> bool:
+        """Whether the columns are states or sensors of the user's own model."""
+        written = isinstance(self.model, Model) and self.model.profile.written
+        return written or not any(set(cls.state_names) & set(self.columns) for cls in COMPILED.values())
+
+    @property
+    def series(self) -> tuple[str, ...]:
+        """The columns that are drawn over time by default, all of one unit."""
+        if not self.is_own:
+            return self.profile.shown.columns
+        names = tuple(self.columns)
+        return tuple(name for name in names if self.axis(name)[1] == self.axis(names[0])[1])[:4]
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """The columns across and up in an orbit's picture; empty if not known."""
+        return tuple(self.columns)[:2] if self.is_own else self.profile.shown.path
+
+    def axis(self, name: str) -> tuple[str, str, float]:
+        """The words, the unit and the factor of a column."""
+        if not self.is_own:
+            return AXES[name]
+        model = self.model
+        named = isinstance(model, Model) and name in model.state_names
+        units = dict(zip(model.state_names, model.state_units, strict=True)) if named else {}
+        return name, units.get(name) or "1", 1.0
+
+    def label(self, name: str) -> str:
+        """Name and unit of a column, as an axis says it."""
+        words, unit, _ = self.axis(name)
+        return f"{words} [{unit}]"
 
     @property
     def _class(self) -> type[Model]:
@@ -123,9 +158,12 @@ def motions(result: Any) -> list[Motion]:
         return [measured(result.measurement, result.model), fitted(result)]
     if hasattr(result, "state") and hasattr(result, "t"):
         state = np.asarray(result.state, dtype=np.float64)
+        model = getattr(result, "model", None)
+        if isinstance(model, Model) and model.profile.written and state.ndim == 2:
+            own = dict(zip(model.state_names, state.T, strict=True))
+            return [Motion("simulated", np.asarray(result.t), own, model, None)]
         if state.ndim != 2 or state.shape[1] not in _BY_NUMBER:
             raise UddError(f"one trajectory can be drawn, state (time, 2 to 4), not {state.shape}")
-        model = getattr(result, "model", None)
         cls = _BY_NUMBER[state.shape[1]]
         if isinstance(model, CompiledModel) and len(type(model).state_names) == state.shape[1]:
             cls = type(model)

@@ -11,7 +11,19 @@ from udd.errors import UddError
 from udd.simulation.energy import angular_momentum
 
 from .inputs import Motion, motions, only
-from .style import AFTER, AXES, BEFORE, FAINT, MEASURED, label, new_axes, scale, tidy
+from .style import (
+    AFTER,
+    AXES,
+    BEFORE,
+    FAINT,
+    MEASURED,
+    SQUARE,
+    WIDE,
+    legend_above,
+    new_axes,
+    scale,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +39,8 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
     result : Trajectory, Measurement or Fit
     ax : Axes, optional
     coordinates : sequence of str, optional
-        Which, all in the same unit; by default Y and Z of a disk, theta of a pendulum, y and z of the DLE.
+        Which, all in the same unit. By default Y and Z of a disk, theta of a pendulum, y and z of the DLE, of
+        another model its first states of one unit.
 
     Returns
     -------
@@ -47,17 +60,18 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
     """
     drawn = motions(result)
     first = drawn[0]
-    names = tuple(coordinates) if coordinates is not None else first.profile.shown.columns
-    units = {AXES[n][1] for n in names if n in AXES}
-    if not names or not all(n in AXES for n in names) or len(units) != 1:
+    names = tuple(coordinates) if coordinates is not None else first.series
+    usable = first.columns if first.is_own else AXES
+    units = {first.axis(n)[1] for n in names if n in usable}
+    if not names or not all(n in usable for n in names) or len(units) != 1:
         raise UddError(
-            f"coordinates must share a unit and be of {', '.join(first.states)}, not {', '.join(names)}"
+            f"coordinates must share a unit and be of {', '.join(first.columns)}, not {', '.join(names)}"
         )
     ax = new_axes(ax)
     for motion in drawn:
         dots = motion.title == "measured"
         for name, colour in zip(names, _COLOURS, strict=False):
-            what = AXES[name][0] + (f", {motion.title}" if len(drawn) > 1 else "")
+            what = motion.axis(name)[0] + (f", {motion.title}" if len(drawn) > 1 else "")
             style: dict[str, Any] = (
                 {"linestyle": "none", "marker": ".", "markersize": 3} if dots else {"linewidth": 1.2}
             )
@@ -65,11 +79,11 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
                 motion[name] if name in motion.columns or len(drawn) == 1 else np.full(len(motion.t), np.nan)
             )
             shade = MEASURED if dots and len(drawn) > 1 else colour
-            ax.plot(motion.t, scale(name) * values, color=shade, label=what, **style)
-    ax.set_xlabel(label(first.time))
-    ax.set_ylabel(label(names[0]) if len(names) == 1 else f"{' and '.join(names)} [{units.pop()}]")
+            ax.plot(motion.t, motion.axis(name)[2] * values, color=shade, label=what, **style)
+    ax.set_xlabel(first.time)
+    ax.set_ylabel(first.label(names[0]) if len(names) == 1 else f"{' and '.join(names)} [{units.pop()}]")
     if len(names) * len(drawn) > 1:
-        ax.legend(frameon=False, loc="upper right", ncols=2)
+        legend_above(ax)
     tidy(ax)
     return ax
 
@@ -77,7 +91,8 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
 def orbit(result: Any, ax: Axes | None = None) -> Axes:
     """The path of the disk's centre in the picture's plane, with the contact and the reach of the wheels.
 
-    A pendulum's path is drawn in its phase plane, the DLE's as (y, z).
+    A pendulum's path is drawn in its phase plane, the DLE's as (y, z), that of another model as its first two
+    states.
 
     Parameters
     ----------
@@ -90,30 +105,31 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
     Axes
     """
     drawn = motions(result)
-    profile = drawn[0].profile
-    shown, columns = profile.shown, profile.sensor.columns
-    if not shown.path:
-        raise UddError(f"nothing says how the orbit of {drawn[0].model!r} is drawn")
-    across, up = shown.path
+    first = drawn[0]
+    shown, columns = first.profile.shown, () if first.is_own else first.profile.sensor.columns
+    contact = shown.contact and not first.is_own
+    if len(first.path) != 2:
+        raise UddError(f"nothing says how the orbit of {first.model!r} is drawn")
+    across, up = first.path
     if columns and up not in columns:
         if up not in drawn[-1].columns:
             raise UddError(
                 f"a {shown.noun}'s measurement holds no angular velocity: fit it first, then draw the fit"
             )
         drawn = drawn[-1:]
-    ax = new_axes(ax)
+    ax = new_axes(ax, size=SQUARE if contact else WIDE)
     for motion in drawn:
-        x, y = scale(across) * motion[across], scale(up) * motion[up]
+        x, y = motion.axis(across)[2] * motion[across], motion.axis(up)[2] * motion[up]
         if motion.title == "measured":
             ax.plot(x, y, ".", color=MEASURED, markersize=2.5, label="measured", rasterized=len(x) > 3000)
         else:
             ax.plot(x, y, color=AFTER, linewidth=0.9, label=motion.title)
-    ax.set_xlabel(label(across))
-    ax.set_ylabel(label(up))
-    if shown.contact:
+    ax.set_xlabel(first.label(across))
+    ax.set_ylabel(first.label(up))
+    if contact:
         _device(ax, drawn)
     if len(drawn) > 1:
-        ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        legend_above(ax)
     tidy(ax)
     return ax
 
@@ -152,7 +168,11 @@ def phase_space(result: Any, ax: Axes | None = None) -> Axes:
         Of a pendulum, whose phase space is a plane (see :func:`orbit`), of a measurement, which holds no
         angular velocity, or of Axes without a third dimension.
     """
+    from matplotlib.ticker import MaxNLocator
+
     motion = only(result)
+    if motion.is_own:
+        raise UddError("phase_space draws the disk and the DLE: use udd.plot.orbit")
     space, noun = motion.profile.shown.space, motion.profile.shown.noun
     if space is None:
         raise UddError(f"a {noun}'s phase space is a plane: use udd.plot.orbit")
@@ -166,13 +186,16 @@ def phase_space(result: Any, ax: Axes | None = None) -> Axes:
         coordinates = {"J": angular_momentum(motion.model, state), "Y": y, "Z": z}
     else:
         coordinates = {name: motion[name] for name in space}
-    drawn: Any = new_axes(ax, projection="3d")
+    drawn: Any = new_axes(ax, projection="3d", size=SQUARE)
     if drawn.name != "3d":
         raise UddError('phase_space needs three-dimensional Axes (projection="3d")')
     names = tuple(coordinates)
     drawn.plot(*(scale(n) * v for n, v in coordinates.items()), color=AFTER, linewidth=0.7)
     for axis, name in zip("xyz", names, strict=True):
-        getattr(drawn, f"set_{axis}label")(label(name))
+        unit = AXES[name][1].partition(" = ")[0]
+        words = AXES[name][0].partition(" = ")[0]
+        getattr(drawn, f"set_{axis}label")(f"{words} [{unit}]", labelpad=8)
+        getattr(drawn, f"{axis}axis").set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     drawn.set_box_aspect(None, zoom=0.85)
     made: Axes = drawn
     return made

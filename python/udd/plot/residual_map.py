@@ -51,7 +51,7 @@ def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axe
         require_fit(one)
     rows, columns = fit.model.state_names, list(coordinates(fit))
     cells = [_cells(one) for one, _ in shown]
-    ax = new_axes(ax)
+    ax = new_axes(ax, size=(1.5 * len(columns) + 1.5, 0.95 * len(rows) + 0.8))
     for r, equation in enumerate(rows):
         top = max(float(np.max(np.abs(m) + 2 * s)) for found in cells for _, m, s in found[r])
         words, unit, factor = EQUATIONS[equation]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -75,15 +76,41 @@ def axis_of(model: Any, name: str) -> tuple[str, float]:
     return f"{name} [{units.get(name) or '1'}]", 1.0
 
 
-def new_axes(ax: Axes | None = None, projection: str | None = None) -> Axes:
-    """The Axes given, or those of a new figure."""
+WIDE, SQUARE = (6.4, 4.4), (5.6, 5.2)
+"""Sizes of new figures in inches; a square one for axes with equal scales."""
+
+
+def new_axes(ax: Axes | None = None, projection: str | None = None, size: tuple[float, float] = WIDE) -> Axes:
+    """The Axes given, or those of a new figure of this size."""
     if ax is not None:
         return ax
     import matplotlib.pyplot as plt
 
-    figure = plt.figure(figsize=(6.4, 4.4), layout="constrained")
+    figure = plt.figure(figsize=size, layout="constrained")
     made: Axes = figure.add_subplot(projection=projection)
     return made
+
+
+def legend_above(
+    ax: Axes, handles: Sequence[Any] | None = None, words: Sequence[str] | None = None, **options: Any
+) -> None:
+    """Put the legend above the axes, in as many columns as fit: beside the axes it would squeeze them."""
+    if handles is None or words is None:
+        handles, words = ax.get_legend_handles_labels()
+    width = ax.get_window_extent().width
+    for columns in range(min(len(words), 5), 0, -1):
+        legend = ax.legend(
+            handles,
+            words,
+            frameon=False,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            borderaxespad=0.2,
+            ncols=columns,
+            **options,
+        )
+        if legend.get_window_extent().width <= width:
+            return
 
 
 def tidy(ax: Axes, grid: bool = True) -> None:

@@ -7,9 +7,12 @@ import html
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 from markupsafe import Markup
+
+from udd._util.one_line import OneLine, cut, link_to
 
 Text = str | Markup  #: Plain text, or text with HTML in it that was made here.
 
@@ -28,8 +31,8 @@ def text_of(markup: object) -> str:
     return html.unescape(re.sub(r"<[^>]*>", "", raised))
 
 
-@dataclass(frozen=True)
-class Image:
+@dataclass(frozen=True, repr=False)
+class Image(OneLine):
     """A picture, as a data URI, with what it shows in words, and its width on the page in pixels."""
 
     uri: str
@@ -48,7 +51,7 @@ class Image:
         return base64.b64decode(self.uri.partition(";base64,")[2])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Movie(Image):
     """A moving picture that loops.
 
@@ -70,8 +73,8 @@ class Movie(Image):
     filmed: bool
 
 
-@dataclass(frozen=True)
-class Paragraph:
+@dataclass(frozen=True, repr=False)
+class Paragraph(OneLine):
     """A paragraph; `style` is a class of the page's style sheet."""
 
     kind: ClassVar[str] = "paragraph"
@@ -79,24 +82,24 @@ class Paragraph:
     style: str = ""
 
 
-@dataclass(frozen=True)
-class Subheading:
+@dataclass(frozen=True, repr=False)
+class Subheading(OneLine):
     """A heading within a section."""
 
     kind: ClassVar[str] = "subheading"
     text: Text
 
 
-@dataclass(frozen=True)
-class Bullets:
+@dataclass(frozen=True, repr=False)
+class Bullets(OneLine):
     """A list."""
 
     kind: ClassVar[str] = "bullets"
     entries: tuple[Text, ...]
 
 
-@dataclass(frozen=True)
-class Figure:
+@dataclass(frozen=True, repr=False)
+class Figure(OneLine):
     """A picture with its caption."""
 
     kind: ClassVar[str] = "figure"
@@ -104,16 +107,16 @@ class Figure:
     caption: Text
 
 
-@dataclass(frozen=True)
-class Gallery:
+@dataclass(frozen=True, repr=False)
+class Gallery(OneLine):
     """Small pictures side by side."""
 
     kind: ClassVar[str] = "gallery"
     figures: tuple[Figure, ...]
 
 
-@dataclass(frozen=True)
-class Column:
+@dataclass(frozen=True, repr=False)
+class Column(OneLine):
     """A column of a table: its heading, and whether it holds numbers or the rows' names."""
 
     title: Text
@@ -121,8 +124,8 @@ class Column:
     names: bool = False
 
 
-@dataclass(frozen=True)
-class Table:
+@dataclass(frozen=True, repr=False)
+class Table(OneLine):
     """A table of text.
 
     Attributes
@@ -157,16 +160,16 @@ class Table:
 Part = Paragraph | Subheading | Bullets | Figure | Gallery | Table
 
 
-@dataclass(frozen=True)
-class Section:
+@dataclass(frozen=True, repr=False)
+class Section(OneLine):
     """A heading and what stands under it."""
 
     heading: Text
     parts: tuple[Part, ...]
 
 
-@dataclass(frozen=True)
-class Number:
+@dataclass(frozen=True, repr=False)
+class Number(OneLine):
     """One of the numbers at the top: what it is, its value, a remark, and a class of the style sheet."""
 
     what: Text
@@ -175,8 +178,8 @@ class Number:
     style: str = ""
 
 
-@dataclass(frozen=True)
-class Head:
+@dataclass(frozen=True, repr=False)
+class Head(OneLine):
     """What stands first.
 
     Attributes
@@ -198,7 +201,7 @@ class Head:
     notes: tuple[Paragraph, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """A report.
 
@@ -210,12 +213,30 @@ class Report:
         The name of the file that it began with, and its SHA-256.
     command : str, optional
         How it was made.
+    path : Path, optional
+        Where it was written as a page.
     """
 
     head: Head
     sections: tuple[Section, ...]
     source: tuple[str, str] | None = None
     command: str | None = None
+    path: Path | None = None
+
+    def __repr__(self) -> str:
+        where = f" {self.path}" if self.path is not None else ""
+        return f"<Report{where}: {cut(self._text, 200)}>"
+
+    def _repr_html_(self) -> str:
+        return (
+            link_to(self.path, self._text) if self.path is not None else f"<p>{html.escape(self._text)}</p>"
+        )
+
+    @property
+    def _text(self) -> str:
+        verdict = " ".join((self.head.verdict or plain(self.head.title)).split())
+        parts = f"{len(self.sections)} sections, {len(self.images)} pictures, {len(self.tables)} tables"
+        return f"{verdict}; {parts}"
 
     def parts(self) -> Iterator[Part]:
         """All parts in their order, those of galleries too."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -108,7 +109,7 @@ def write(
     refuse_folder(path)
     report = report_of(discovery, film=film, source=source, command=command)
     write_page(report, path)
-    return report
+    return replace(report, path=Path(path))
 
 
 def refuse_folder(path: str | os.PathLike[str]) -> None:

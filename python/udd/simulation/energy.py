@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
+from udd._util.one_line import OneLine
 from udd.errors import ModelError
 from udd.models import Disk
 
@@ -18,8 +20,8 @@ __all__ = ["EnergyBalance", "energy_balance"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class EnergyBalance:
+@dataclass(frozen=True, eq=False, repr=False)
+class EnergyBalance(Drawable, OneLine):
     """Powers per unit mass over a run; ``stored' = motor - friction + effects`` holds exactly.
 
     Attributes

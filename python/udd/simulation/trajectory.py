@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.labelled import of_states
 from udd._util.validation import array, number
 from udd.errors import IncompleteWarning, ModelError
@@ -102,7 +103,7 @@ class Stats(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Drawable):
     """A run.
 
     Attributes
