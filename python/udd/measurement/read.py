@@ -18,6 +18,7 @@ from udd._util.input_files import LARGEST, MemoryLimit, read_regular
 from udd.errors import MeasurementError
 
 from .formats import HEAD, Table, format_of
+from .formats.headings import Heading
 from .input_signal import Hold
 from .recorded import Frames, Recorded, Units, own_inputs
 from .table import DISK, PENDULUM, QUALITY, Measurement, check_length
@@ -132,17 +133,20 @@ def read_measurement(
     return m
 
 
+def headings_of(
+    path: str | os.PathLike[str], columns: Columns | None = None, *, limit: float = LARGEST
+) -> list[Heading]:
+    """The headings of a file's columns that have a name, with the units that they state."""
+    tables = _load(Path(path), _mapping(columns)[1], limit)
+    return [heading for table in tables for heading in table.headings if heading.name]
+
+
 def columns_of(
     path: str | os.PathLike[str], columns: Columns | None = None, *, limit: float = LARGEST
 ) -> list[str]:
     """The names of a file's columns, read as by :func:`read_measurement`."""
-    mapping, given = _mapping(columns)
-    names = [
-        heading.name
-        for table in _load(Path(path), given, limit)
-        for heading in table.headings
-        if heading.name
-    ]
+    mapping = _mapping(columns)[0]
+    names = [heading.name for heading in headings_of(path, columns, limit=limit)]
     return [*(mapping or {}), *(name for name in names if name not in (mapping or {}))]
 
 

@@ -1,0 +1,76 @@
+"""Which column of a table is a gyroscope's: the rate at which a phone on a pendulum turns."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from udd._util.input_files import LARGEST
+from udd.errors import MeasurementError
+
+from .formats.headings import UNITS
+from .read import headings_of, read_measurement
+from .table import Measurement
+
+RATE = ("Omega",)
+_PLACES = {"theta", "Y", "Z", "beta", "x", "y"}
+
+
+def gyroscope_columns(path: str | os.PathLike[str], *, limit: float = LARGEST) -> list[str]:
+    """Return the columns whose headings state a rate of turning, such as ``Gyroscope x (rad/s)``."""
+    return [one.raw for one in headings_of(path, limit=limit) if one.unit in UNITS["rad/s"]]
+
+
+def holds_rates_alone(path: str | os.PathLike[str], *, limit: float = LARGEST) -> bool:
+    """Return True if a file has rates of turning, and no place or angle of a disk or a pendulum."""
+    found = headings_of(path, limit=limit)
+    return any(one.unit in UNITS["rad/s"] for one in found) and not {one.name for one in found} & _PLACES
+
+
+def read_gyroscope(
+    path: str | os.PathLike[str], column: str | None = None, *, limit: float = LARGEST, **options: object
+) -> Measurement:
+    """Read the rate of turning that a gyroscope measured, as the column ``Omega`` in rad/s.
+
+    Parameters
+    ----------
+    path : path
+        A table, or phyphox's zip of tables.
+    column : str, optional
+        The gyroscope's axis; by default, of all columns whose headings state rad/s, deg/s or another rate of
+        turning, the one that varies most and takes both signs: a magnitude does not.
+    limit : float
+        As of :func:`udd.read_measurement`.
+    **options
+        Other options of it.
+
+    Returns
+    -------
+    Measurement
+        ``meta["gyroscope"]`` names the column.
+
+    Raises
+    ------
+    MeasurementError
+        No column is a rate of turning, or the file cannot be read.
+
+    Examples
+    --------
+    >>> import udd
+    >>> udd.measurement.read_gyroscope(udd.examples.path("phone.csv")).meta["gyroscope"]
+    'Gyroscope x (rad/s)'
+    """
+    names = [column] if column else gyroscope_columns(path, limit=limit)
+    read = [
+        read_measurement(path, {"Omega": name}, limit=limit, **options)  # type: ignore[arg-type]
+        for name in names
+    ]
+    signed = [k for k, one in enumerate(read) if np.nanmin(one.values) < 0.0 < np.nanmax(one.values)]
+    if not signed:
+        raise MeasurementError(
+            f"{path}: no column is a rate of turning that takes both signs; a heading should state rad/s "
+            "or deg/s"
+        )
+    best = max(signed, key=lambda k: float(np.nanstd(read[k].values)))
+    return read[best].with_meta(gyroscope=names[best])
