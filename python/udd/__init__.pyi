@@ -2,6 +2,7 @@
 
 from . import effects as effects
 from . import errors as errors
+from . import examples as examples
 from . import film as film
 from . import paper as paper
 from . import plot as plot
