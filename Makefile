@@ -143,7 +143,7 @@ lock: .venv/.made ## write requirements/*.txt anew, with today's versions
 	rm -f requirements/*.txt
 	$(PART) requirements/build.txt --group build
 	$(PART) requirements/demo.txt pyproject.toml --extra track
-	$(PART) requirements/user.txt pyproject.toml $(addprefix --extra ,app formula hdf5 parquet scale track)
+	$(PART) requirements/user.txt pyproject.toml --extra all
 	$(PART) requirements/test.txt --group test
 	$(PART) requirements/lint.txt --group lint
 	$(PART) requirements/docs.txt pyproject.toml --extra docs

@@ -17,7 +17,16 @@ _PORT = 8765
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Serve the page on this machine: the disk live, its dynamics, a film in and a verdict out."
-    parser = new(commands, "app", run, summary)
+    parser = new(
+        commands,
+        "app",
+        run,
+        summary,
+        (
+            "udd app",
+            "udd app --host 0.0.0.0 --no-browser",
+        ),
+    )
     parser.add_argument(
         "link",
         nargs="?",

@@ -12,7 +12,7 @@ from udd.errors import IncompleteWarning, ModelError, UddError
 from .export import PICTURES, add_out, checked, save
 from .model_options import add_models, add_runs, axis_of, model_of, runs_of, starts_of
 from .options import new
-from .output import CommandResult, is_terminal
+from .output import CommandResult, shown_progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +23,16 @@ if TYPE_CHECKING:
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Basins of attraction: which initial states end on which attractor."
-    parser = new(commands, "basins", run, summary)
+    parser = new(
+        commands,
+        "basins",
+        run,
+        summary,
+        (
+            "udd basins omega=-4:4:40 z=-4:4:40 --w 7.6 --out basins.png",
+            "udd basins omega=-4:4:12 y=-4:4:12 --w 9",
+        ),
+    )
     parser.add_argument(
         "grid",
         nargs="+",
@@ -60,7 +69,7 @@ def run(args: argparse.Namespace) -> CommandResult:
             model_of(args, {}),
             grid,
             state0=None if starts is None else starts[0],
-            progress=is_terminal(),
+            progress=shown_progress(),
             **runs_of(args),
             partial=True,
         )

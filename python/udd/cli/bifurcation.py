@@ -19,7 +19,7 @@ from .model_options import (
     starts_of,
 )
 from .options import new
-from .output import CommandResult, is_terminal
+from .output import CommandResult, shown_progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +30,16 @@ _MANY = 12  # stretches that are worth a line each
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Bifurcation diagram: where motions cross a section, over a parameter, and on which attractor."
-    parser = new(commands, "bifurcation", run, summary)
+    parser = new(
+        commands,
+        "bifurcation",
+        run,
+        summary,
+        (
+            "udd bifurcation w --from 5 --to 8 --n 40 --path both --out diagram.png --out diagram.nc",
+            "udd bifurcation mu --model own.json --from 0.5 --to 2 --n 8 --section x",
+        ),
+    )
     parser.add_argument("parameter", help="what is varied, such as w, W or relaxation.b")
     parser.add_argument("--from", dest="first", type=float, required=True, help="first value")
     parser.add_argument("--to", dest="last", type=float, required=True, help="last value")
@@ -66,7 +75,7 @@ def run(args: argparse.Namespace) -> CommandResult:
             values,
             initial_states=starts_of(args),
             path=args.path,
-            progress=is_terminal(),
+            progress=shown_progress(),
             **runs_of(args),
             partial=True,
         )

@@ -27,7 +27,16 @@ _DATA = (".json",)
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Follow equilibria or a cycle over a parameter, through folds, and locate bifurcations."
-    parser = new(commands, "continuation", run, summary)
+    parser = new(
+        commands,
+        "continuation",
+        run,
+        summary,
+        (
+            "udd continuation w --from 7 --to 9 --out branches.png",
+            "udd continuation w --from 5.9 --to 6.1 --at 6 --state 0.72665,-8.82437,0 --crises",
+        ),
+    )
     parser.add_argument("parameter", help="what is varied, such as w, W or relaxation.b")
     parser.add_argument("--from", dest="first", type=float, required=True, help="least value")
     parser.add_argument("--to", dest="last", type=float, required=True, help="largest value")

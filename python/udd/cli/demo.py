@@ -7,13 +7,22 @@ from pathlib import Path
 from typing import Any
 
 from .options import new
-from .output import CommandResult, is_terminal, status_line
+from .output import CommandResult, shown_progress
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Track the sample film, find what the model lacks, and write the page that says so."
-    parser = new(commands, "demo", run, summary)
+    parser = new(
+        commands,
+        "demo",
+        run,
+        summary,
+        (
+            "udd demo",
+            "udd demo --null --out null",
+        ),
+    )
     parser.add_argument(
         "--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default ./demo)"
     )
@@ -25,8 +34,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     from udd.demo.pipeline import demo
     from udd.report import as_text, summary_of
 
-    with status_line() as tell:
-        made = demo(args.out, null=args.null, progress=tell, bar=is_terminal())
+    made = demo(args.out, null=args.null, progress=shown_progress())
     text = f"{as_text(summary_of(made.discovery))}\nmeasurement: {made.measurement}\nreport: {made.report}"
     data = {"measurement": made.measurement, "report": made.report, **made.discovery.to_dict()}
     return CommandResult(text, data)

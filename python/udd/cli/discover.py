@@ -26,6 +26,10 @@ def add(commands: Any) -> None:
         "discover",
         run,
         "Find the effect that the model lacks, from a film or a measurement, or from several jointly.",
+        (
+            "udd discover disk.csv --report report.html",
+            "udd discover slow.csv fast.csv --budget 20 --held-out fast.csv",
+        ),
     )
     add_input(parser, several=True)
     parser.add_argument(

@@ -14,7 +14,7 @@ from udd._util.json_output import as_json
 from udd.errors import UddError
 
 from .option_names import in_options
-from .output import CommandResult
+from .output import CommandResult, speaking
 from .parser import make_parser
 
 # What need not be installed: the extra that brings it, and who needs it.
@@ -22,6 +22,7 @@ _EXTRAS = {
     "av": ("track", "films need"),
     "cv2": ("track", "films need"),
     "distributed": ("scale", "sweeps need"),
+    "shtab": ("shell", "completion needs"),
     "starlette": ("app", "the page needs"),
     "uvicorn": ("app", "the page needs"),
     "websockets": ("app", "the page needs"),
@@ -52,7 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _warn
-            answer: CommandResult = args.run(args)
+            with speaking("" if args.command == "app" else f"{args.command} is at work"):
+                answer: CommandResult = args.run(args)
         _print(answer, args.json)
         sys.stdout.flush()
     except UddError as error:

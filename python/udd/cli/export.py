@@ -79,6 +79,8 @@ def checked(paths: list[Path], data: tuple[str, ...] = DATA) -> None:
             require_writable(path)
         elif not path.parent.is_dir():
             raise UddError(f"{path}: there is no folder {path.parent}")
+        if path.suffix == ".zarr":
+            import zarr  # noqa: F401 - a missing package is named now, not after the work
         if path.suffix == ".zarr" and path.exists():
             raise UddError(f"{path} exists already: Zarr needs a new folder")
 

@@ -12,7 +12,7 @@ from udd.errors import UddError
 
 from .export import OutputFile
 from .options import disk, new
-from .output import CommandResult, is_terminal
+from .output import CommandResult, shown_progress
 from .simulate import add_run, run_model
 
 _STEP = 0.005  # s between samples of the run, short enough for the camera
@@ -20,7 +20,16 @@ _STEP = 0.005  # s between samples of the run, short enough for the camera
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = new(commands, "film", run, "Film a simulated run of the disk, as a camera before it would.")
+    parser = new(
+        commands,
+        "film",
+        run,
+        "Film a simulated run of the disk, as a camera before it would.",
+        (
+            "udd film run.mp4 --W 0.042 --t 2 --effect relaxation:b=6",
+            "udd film small.mp4 --W 0.042 --t 1 --size 220x280",
+        ),
+    )
     parser.add_argument("out", type=Path, action=OutputFile, metavar="OUT.mp4", help="film to write")
     add_run(parser)
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second (default 25)")
@@ -71,7 +80,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         codec=args.codec,
         defects=defects,
         rng=args.seed,
-        progress=is_terminal(),
+        progress=shown_progress(),
     )
     left = ", until the disk leaves the wheels" if trajectory.outcome == "ejected" else ""
     text = f"{made.path}: {len(made.t)} frames, {made.t[-1]:.2f} s{left}"

@@ -12,10 +12,19 @@ from .output import CommandResult, status_line
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = new(commands, "fit", run, "Fit the model to a film or a measurement, or to several jointly.")
+    parser = new(
+        commands,
+        "fit",
+        run,
+        "Fit the model to a film or a measurement, or to several jointly.",
+        (
+            "udd fit disk.csv --uncertainties",
+            'udd fit driven.csv --model driven.json --columns "theta=position" --inputs "tau=torque"',
+        ),
+    )
     add_input(parser, several=True)
     parser.add_argument(
-        "--budget",
+        "--uncertainties",
         action="store_true",
         help="say from what the uncertainty of each number comes: noise, camera, scale, priors, R, g",
     )
@@ -30,7 +39,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     with status_line() as tell:
         tell("fitting")
         found = fit(*given.measured, **options(args))
-    if not args.budget:
+    if not args.uncertainties:
         return CommandResult(str(found), {**given.told, **found.to_dict()})
     tables = found.budget()
     text = f"{found}\n\nexpanded uncertainties, and shares of the variance:\n{tables}"

@@ -24,7 +24,16 @@ _DATA = (".csv",)
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Fit the model, filter the last second, and run free: a forecast with the fan of an ensemble."
-    parser = new(commands, "forecast", run, summary)
+    parser = new(
+        commands,
+        "forecast",
+        run,
+        summary,
+        (
+            "udd forecast disk.csv --start 20 --out fan.png",
+            "udd forecast pendulum.csv --t 5 --members 50 --out fan.csv",
+        ),
+    )
     add_input(parser)
     parser.add_argument("--t", type=float, help="how far to look ahead [s] (default 10; a pendulum 60)")
     parser.add_argument(

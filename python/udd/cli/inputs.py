@@ -14,7 +14,7 @@ from udd.errors import UddError
 
 from .option_names import OPTIONS
 from .options import add_disk, add_pendulum, disk, effects, given, names, pendulum, refuse_others
-from .output import is_terminal
+from .output import shown_progress
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -68,6 +68,14 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         dest="inputs",
         metavar="NAMES",
         help='columns with what drove it, such as "torque" or "u=Motor torque (N m)"',
+    )
+    parser.add_argument(
+        "--gyroscope",
+        nargs="?",
+        const="",
+        metavar="COLUMN",
+        help="a gyroscope measured the pendulum's rate of turning: its column (default: of those in rad/s or "
+        "deg/s the one that varies most; so it is taken where a table has no angle)",
     )
     parser.add_argument(
         OPTIONS["rate"],
@@ -176,6 +184,8 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
 
         states, inputs = None, args.inputs
         limit = {} if args.limit is None else {"limit": args.limit}
+        if args.model is None and _is_gyroscope(args, limit):
+            return _gyroscope(args, limit), None
         if args.model is not None:
             there = columns_of(args.file, args.columns, **limit)
             model = own_model(args)
@@ -212,8 +222,28 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     from udd.tracking import track
 
     radius = 0.08 if args.R is None else args.R
-    found = whole(args, lambda: track(args.file, disk_radius=radius, progress=is_terminal()))
+    found = whole(args, lambda: track(args.file, disk_radius=radius, progress=shown_progress()))
     return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
+
+
+def _is_gyroscope(args: argparse.Namespace, limit: dict[str, float]) -> bool:
+    """Return True if a table is a gyroscope's: an option says so, or it has rates of turning alone."""
+    from udd.measurement.gyroscope import holds_rates_alone
+
+    if args.gyroscope is not None:
+        return True
+    return args.columns is None and holds_rates_alone(args.file, **limit)
+
+
+def _gyroscope(args: argparse.Namespace, limit: dict[str, float]) -> Measurement:
+    from udd.measurement.gyroscope import read_gyroscope
+
+    options = {"rate": args.sampling, "repeated": args.repeated, "part": args.part}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r".*: converted .*, as its columns say$")
+        found = read_gyroscope(args.file, args.gyroscope or None, **limit, **options)
+    print(f"udd: {args.file}: read Omega from {found.meta['gyroscope']}", file=sys.stderr)
+    return found
 
 
 def add_partial(parser: argparse.ArgumentParser) -> None:
@@ -243,6 +273,10 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
         return own_model(args)
     if measurement.kind == "pendulum":
         return _pendulum(args, measurement)
+    if measurement.names == ("Omega",):
+        if args.effect:
+            raise UddError("--effect does not apply to a gyroscope's record: say the law with --model")
+        return _pendulum(args, measurement).with_gyroscope()
     if measurement.kind != "disk":
         columns = (
             f"column {measurement.names[0]} is"

@@ -9,21 +9,18 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from udd.errors import ConvergenceWarning, IntegrationError, UddError
 
-from .options import new
-from .output import CommandResult, is_terminal
+from .model_options import add_others, model_of, own_start
+from .options import new, numbers, refuse_others
+from .output import CommandResult, shown_progress
 
-_LARGEST = ("w", "lambda_1", "standard_error")
-_SPECTRUM = (
-    "w",
-    *(f"{what}_{k}" for k in (1, 2, 3) for what in ("lambda", "standard_error")),
-    "dimension",
-    "verdict",
-    "period",
-)
+if TYPE_CHECKING:
+    from udd.models import Model
+
+_LARGEST = ("lambda_1", "standard_error")
 
 
 class _Row(NamedTuple):
@@ -39,13 +36,15 @@ def add(commands: Any) -> None:
         commands,
         "lyapunov",
         run,
-        "Lyapunov exponents of the diffusionless Lorenz equations; the table is CSV.",
+        "Lyapunov exponents of the diffusionless Lorenz equations, or of another model; the table is CSV.",
+        ("udd lyapunov 1 3.9 7.1", "udd lyapunov --disk 0.039 --ignore-edge --t 200 --tol 0.1"),
     )
-    parser.add_argument("w", type=float, nargs="*", help="drives")
-    parser.add_argument("--from", dest="first", type=float, help="first of equally spaced drives")
+    parser.add_argument("w", type=float, nargs="*", help="drives of the diffusionless Lorenz equations")
+    parser.add_argument("--over", metavar="NAME", help="the parameter that is varied (default: the drive)")
+    parser.add_argument("--from", dest="first", type=float, help="the first of equally spaced values")
     parser.add_argument("--to", dest="last", type=float, help="the last")
     parser.add_argument("--n", type=int, help="how many")
-    parser.add_argument("--B", type=float, default=0.0, help="damping (default 0)")
+    parser.add_argument("--B", type=float, help="damping of these equations (default 0)")
     parser.add_argument(
         "--spectrum",
         action="store_true",
@@ -56,27 +55,31 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--t",
         type=float,
-        help="dimensionless time of the run at most (default 100000, with --spectrum 200000)",
+        help="time of the run at most (default 100000 typical times of the model, with --spectrum 200000)",
     )
     parser.add_argument(
         "--tol", type=float, default=1e-3, help="standard error to reach, of the largest (default 1e-3)"
     )
+    parser.add_argument("--state", metavar="X,X,X", help="initial state, for another model")
+    add_others(parser)
 
 
 def run(args: argparse.Namespace) -> CommandResult:
     """Do it; on Ctrl-C what is finished is kept."""
-    from tqdm import tqdm
+    from udd._util.progress import progress_bar
 
-    drives = _drives(args)
-    _check(args, drives)
-    head, portions = (_SPECTRUM, _spectra) if args.spectrum else (_LARGEST, _exponents)
+    swept = _swept(args)
+    drives = swept.values
+    head, portions = (
+        (swept.spectrum_head, _spectra) if args.spectrum else ((swept.name, *_LARGEST), _exponents)
+    )
     rows: list[_Row] = []
     stopped = False
     if not args.json:
         print(",".join(head), flush=True)
-    with tqdm(total=len(drives), unit="w", disable=not is_terminal() or len(drives) == 1, leave=False) as bar:
+    with progress_bar(len(drives), "value", shown_progress() if len(drives) > 1 else False) as bar:
         try:
-            for found in portions(drives, args):
+            for found in portions(swept, args):
                 rows += found
                 bar.update(len(found))
                 if not args.json:
@@ -88,7 +91,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     if stopped:
         print(f"udd: stopped after {len(rows)} of {len(drives)}", file=sys.stderr)
     data = {
-        "B": args.B,
+        **({"B": args.B or 0.0} if swept.is_dle else {"model": repr(swept.model)}),
         "complete": not stopped,
         "spectra" if args.spectrum else "exponents": [
             dict(zip(head, row.cells, strict=True)) for row in rows
@@ -97,36 +100,79 @@ def run(args: argparse.Namespace) -> CommandResult:
     return CommandResult("", data, 130 if stopped else 0)
 
 
-def _drives(args: argparse.Namespace) -> list[float]:
+class _Swept(NamedTuple):
+    """A model, the parameter that is varied, and its values."""
+
+    model: Model
+    name: str
+    values: list[float]
+    start: list[float] | None
+    is_dle: bool
+
+    @property
+    def spectrum_head(self) -> tuple[str, ...]:
+        """The columns of a table of spectra."""
+        numbers = range(1, len(self.model.state_names) + 1)
+        pairs = (f"{what}_{k}" for k in numbers for what in ("lambda", "standard_error"))
+        return (self.name, *pairs, "dimension", "verdict", "period")
+
+
+def _swept(args: argparse.Namespace) -> _Swept:
+    """Read and check the options before the work."""
     import numpy as np
 
-    swept = [args.first, args.last, args.n]
-    if args.w and any(x is not None for x in swept):
-        raise UddError("give drives, or --from, --to and --n, not both")
-    if args.w:
-        return list(args.w)
-    if any(x is None for x in swept):
-        raise UddError("say at which drives: udd lyapunov 0.5 1 3.9, or --from 0.5 --to 8 --n 100")
-    if args.n < 1:
-        raise UddError(f"--n must be at least 1, not {args.n}")
-    if not np.isfinite([args.first, args.last]).all():
-        raise UddError(f"--from and --to must be finite, not {args.first} and {args.last}")
-    return [float(w) for w in np.linspace(args.first, args.last, args.n)]
-
-
-def _check(args: argparse.Namespace, drives: list[float]) -> None:
     from udd._util.validation import number
     from udd.models import DLE
 
-    for w in drives:
-        DLE(w, args.B)
     number("--tol", args.tol, above=0.0)
     if args.t is not None:
         number("--t", args.t, above=0.0)
+    grid = [args.first, args.last, args.n]
+    values = None
+    if any(x is not None for x in grid):
+        if args.w:
+            raise UddError("give drives, or --from, --to and --n, not both")
+        if any(x is None for x in grid):
+            raise UddError("say at which values: --from 0.5 --to 8 --n 100, all three of them")
+        if args.n < 1:
+            raise UddError(f"--n must be at least 1, not {args.n}")
+        if not np.isfinite([args.first, args.last]).all():
+            raise UddError(f"--from and --to must be finite, not {args.first} and {args.last}")
+        values = [float(x) for x in np.linspace(args.first, args.last, args.n)]
+    other = any(getattr(args, name) is not None for name in ("W", "pendulum", "model"))
+    if other and args.w:
+        raise UddError("drives without an option are those of the DLE: say one model")
+    if other or args.over == "W":
+        args.w = None
+        first = None if values is None or args.over not in (None, "W") else values[0]
+        model = model_of(args, {} if first is None or args.W is not None else {"W": first})
+        name = args.over or ("W" if "W" in model.parameters else next(iter(model.parameters), ""))
+        _require(model, name)
+        start = own_start(args) if args.state is None else numbers([args.state], "--state")
+        return _Swept(model, name, values or [float(model.parameters[name])], start, False)
+    values = values or list(args.w)
+    if not values:
+        raise UddError(
+            "say at which drives: udd lyapunov 0.5 1 3.9, or --from 0.5 --to 8 --n 100; or another model: "
+            "--disk W, --pendulum LENGTH, --model FILE"
+        )
+    refuse_others(args, "dle")
+    name = args.over or "w"
+    base = DLE(1.0, 0.0 if args.B is None else args.B)
+    _require(base, name)
+    for value in values:
+        base.replace(**{name: value})
+    start = None if args.state is None else numbers([args.state], "--state")
+    return _Swept(base, name, values, start, True)
 
 
-def _exponents(drives: list[float], args: argparse.Namespace) -> Iterator[list[_Row]]:
-    """The largest exponents, some drives at a time.
+def _require(model: Model, name: str) -> None:
+    if name not in model.parameters:
+        raise UddError(f"--over: the model has no parameter {name!r}; it has {', '.join(model.parameters)}")
+
+
+def _exponents(swept: _Swept, args: argparse.Namespace) -> Iterator[list[_Row]]:
+    """The largest exponents, some values at a time.
 
     `udd.lyapunov` would take all at once, but gives nothing before the end, and on Ctrl-C nothing at all.
     Here a portion has a packet of orbits for each core at first, and grows while it takes less than a second.
@@ -134,13 +180,19 @@ def _exponents(drives: list[float], args: argparse.Namespace) -> Iterator[list[_
     from udd.chaos.largest_exponent import PORTION, lyapunov
 
     first, size = 0, 8 * (os.cpu_count() or 1)
-    while first < len(drives):
-        portion = drives[first : first + size]
+    while first < len(swept.values):
+        portion = swept.values[first : first + size]
         start = time.monotonic()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)
             values, errors = lyapunov(
-                portion, parameters={"B": args.B}, t=args.t, tol=args.tol, progress=False, with_error=True
+                swept.model,
+                parameters={swept.name: portion},
+                t=args.t,
+                tol=args.tol,
+                state0=swept.start,
+                progress=False,
+                with_error=True,
             )
         table = zip(portion, values.tolist(), errors.tolist(), strict=True)
         yield [_Row(cells, cells[2] <= args.tol) for cells in table]
@@ -149,21 +201,22 @@ def _exponents(drives: list[float], args: argparse.Namespace) -> Iterator[list[_
             size = min(2 * size, PORTION)
 
 
-def _spectra(drives: list[float], args: argparse.Namespace) -> Iterator[list[_Row]]:
-    """All exponents, drive by drive."""
+def _spectra(swept: _Swept, args: argparse.Namespace) -> Iterator[list[_Row]]:
+    """All exponents, value by value."""
     from udd.chaos.spectrum import lyapunov_spectrum
-    from udd.models import DLE
 
-    for w in drives:
+    for value in swept.values:
+        model = swept.model.with_parameters({swept.name: value})
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ConvergenceWarning)
-                found = lyapunov_spectrum(DLE(w, args.B), t=args.t, tol=args.tol)
+                found = lyapunov_spectrum(model, t=args.t, tol=args.tol, state0=swept.start)
         except IntegrationError:
-            yield [_Row((w, *[math.nan] * 7, "failed", math.nan), False)]
+            absent = [math.nan] * (2 * len(model.state_names) + 1)
+            yield [_Row((value, *absent, "failed", math.nan), False)]
             continue
         pairs = zip(found.exponents.tolist(), found.standard_errors.tolist(), strict=True)
-        cells = (w, *(x for pair in pairs for x in pair), found.dimension, found.verdict, found.period)
+        cells = (value, *(x for pair in pairs for x in pair), found.dimension, found.verdict, found.period)
         yield [_Row(cells, found.converged)]
 
 

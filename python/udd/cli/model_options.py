@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from udd.errors import UddError
 
+from .inputs import own_model, start_of
 from .options import add_disk, add_pendulum, disk, numbers, pendulum, refuse_others
 
 if TYPE_CHECKING:
@@ -20,11 +22,28 @@ if TYPE_CHECKING:
 def add_models(parser: argparse.ArgumentParser) -> None:
     """Any of the models."""
     add_dle(parser)
+    add_others(parser)
+
+
+def add_others(parser: argparse.ArgumentParser) -> None:
+    """The models other than the dimensionless equations."""
     add_disk(parser, "drive speed of the disk [m/s]")
     parser.add_argument(
         "--ignore-edge", action="store_true", help="follow the disk's equations beyond its edge"
     )
     add_pendulum(parser)
+    add_own(parser)
+
+
+def add_own(parser: argparse.ArgumentParser) -> None:
+    """A model of the user's own."""
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help='a model of your own, as JSON or TOML: {"states": ["x", "v"], "equations": {"x": "v", '
+        '"v": "-k*x"}, "parameters": {"k": 1.0}, "state0": {"x": 1.0, "v": 0.0}}',
+    )
 
 
 def add_dle(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +56,7 @@ def model_of(args: argparse.Namespace, varied: Mapping[str, float]) -> Model:
     """The model; a drive that is varied says which, and has its first value."""
     drives = {name: getattr(args, name) for name in ("W", "w", "pendulum")}
     for name in ("W", "w"):
-        if name in varied:
+        if name in varied and getattr(args, "model", None) is None:
             drives[name] = varied[name]
     return chosen(args, drives)
 
@@ -47,8 +66,13 @@ def chosen(args: argparse.Namespace, drives: Mapping[str, float | None]) -> Mode
     from udd.models import DLE
 
     w, length, W = drives["w"], drives["pendulum"], drives["W"]
-    if sum(value is not None for value in drives.values()) != 1:
-        raise UddError("say which model: --W (the disk), --w (the DLE) or --pendulum, one of them")
+    own = getattr(args, "model", None)
+    if sum(value is not None for value in (*drives.values(), own)) != 1:
+        raise UddError(
+            "say which model: --disk W, --w (the DLE), --pendulum LENGTH or --model FILE, one of them"
+        )
+    if own is not None:
+        return own_model(args)
     if w is not None:
         refuse_others(args, "dle")
         return DLE(w, 0.0 if args.B is None else args.B)
@@ -105,8 +129,27 @@ def check_count(name: str, value: int, least: int) -> None:
 
 
 def starts_of(args: argparse.Namespace) -> list[list[float]] | None:
-    """The initial states, if any are given."""
-    return None if args.state is None else [numbers([text], "--state") for text in args.state]
+    """The initial states, if any are given; of a model of one's own that which its file gives."""
+    if args.state is not None:
+        return [numbers([text], "--state") for text in args.state]
+    start = own_start(args)
+    return None if start is None else [start]
+
+
+def own_start(args: argparse.Namespace) -> list[float] | None:
+    """The initial state in the file of the user's own model, None if it gives none.
+
+    Raises
+    ------
+    UddError
+        There is neither that nor a state on the command line.
+    """
+    if getattr(args, "model", None) is None:
+        return None
+    names, start = own_model(args).state_names, start_of(args)
+    if isinstance(start, dict) and set(names) <= set(start):
+        return [float(start[name]) for name in names]
+    raise UddError(f'say where the motion starts: --state {",".join(names)}, or "state0" in {args.model}')
 
 
 def axis_of(first: float, last: float, n: int) -> NDArray[np.float64]:

@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from udd._util.number_text import number_in
 from udd.errors import UddError
+
+from .suggestions import meant
 
 if TYPE_CHECKING:
     from udd.effects import Effect
     from udd.models import Disk, Pendulum
 
 
-def new(commands: Any, name: str, run: Any, summary: str) -> argparse.ArgumentParser:
-    """A command with what all have."""
-    parser: argparse.ArgumentParser = commands.add_parser(name, help=summary, description=summary)
+def new(
+    commands: Any, name: str, run: Any, summary: str, examples: tuple[str, ...] = (), more: str = ""
+) -> argparse.ArgumentParser:
+    """A command with what all have; `examples` end its help, after `more`."""
+    shown = "\n".join(["examples:", *(f"  {one}" for one in examples)])
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        description=summary,
+        epilog=f"{more}\n{shown}" if more else shown,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.summary = summary  # type: ignore[attr-defined]
+    parser.examples = examples  # type: ignore[attr-defined]
     parser.add_argument(
         "--json", action="store_true", help="print JSON, and nothing else, to standard output"
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, command=name)
     return parser
 
 
@@ -28,6 +41,7 @@ def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
     group = parser.add_argument_group("the disk")
     speed = group.add_mutually_exclusive_group()
     speed.add_argument("--W", type=float, metavar="M/S", help=drive)
+    speed.add_argument("--disk", dest="W", type=float, metavar="M/S", help="another name of --W")
     speed.add_argument(
         "--rate",
         dest="W",
@@ -100,10 +114,15 @@ def refuse_others(args: argparse.Namespace, kind: str, where: str = "") -> None:
         raise UddError(f"{where}{option} does not apply to {_KINDS[kind]}")
 
 
+_FAST = 0.5  # m/s: the device's drive is a tenth of that, and W in cm/s a hundred times more
+
+
 def disk(args: argparse.Namespace, W: float, R: float) -> Disk:
     """The disk that the options describe."""
     from udd.models import Disk
 
+    if W > _FAST:
+        warnings.warn(f"W is {W:g} m/s; expected about 0.04 m/s. Is it in cm/s?", UserWarning, stacklevel=2)
     return Disk(W, R=R, effects=effects(args.effect), **given(args, "g", "k0", "k1", "k2"))
 
 
@@ -138,7 +157,7 @@ def effects(texts: list[str]) -> tuple[Effect, ...]:
     for text in texts:
         name, _, rest = text.partition(":")
         if name not in specs:
-            raise ModelError(f"no effect is called {name!r}; there are {', '.join(specs)}")
+            raise ModelError(f"no effect is called {name!r}{meant(name, specs)} (udd effects lists them)")
         values: dict[str, float] = {}
         choices: dict[str, str] = {}
         for item in filter(None, rest.split(",")):

@@ -13,7 +13,16 @@ from .output import CommandResult, status_line
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Draw the paper's figures, check its claims, and write the page that shows both."
-    parser = new(commands, "paper", run, summary)
+    parser = new(
+        commands,
+        "paper",
+        run,
+        summary,
+        (
+            "udd paper --only eigenvalues --no-films",
+            "udd paper --out paper --no-films",
+        ),
+    )
     parser.add_argument(
         "--out", type=Path, default=Path("paper"), metavar="DIR", help="folder (default ./paper)"
     )

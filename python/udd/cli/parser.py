@@ -13,9 +13,12 @@ from . import (
     app,
     basins,
     bifurcation,
+    completion,
     continuation,
     demo,
     discover,
+    effects,
+    example,
     film,
     fit,
     forecast,
@@ -26,28 +29,23 @@ from . import (
     sweep,
     track,
 )
+from .suggestions import meant
 
-_COMMANDS = (
-    demo,
-    simulate,
-    lyapunov,
-    poincare,
-    bifurcation,
-    continuation,
-    basins,
-    sweep,
-    film,
-    track,
-    fit,
-    forecast,
-    discover,
-    paper,
-    app,
-)
+#: The commands, in the groups in which the help lists them.
+GROUPS = {
+    "begin": (demo, example, app),
+    "films": (film, track),
+    "measurements": (fit, discover, forecast, effects),
+    "dynamics": (simulate, lyapunov, poincare, bifurcation, basins, continuation, sweep),
+    "more": (paper, completion),
+}
 
 
 class Parser(argparse.ArgumentParser):
-    """An ArgumentParser that takes ``-1e-3`` and ``-1,2`` for values and names the decimal sign."""
+    """An ArgumentParser that takes ``-1e-3`` and ``-1,2`` for values, and says what may be meant."""
+
+    summary = ""
+    examples: tuple[str, ...] = ()
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         kwargs["allow_abbrev"] = False
@@ -56,18 +54,51 @@ class Parser(argparse.ArgumentParser):
         self.register("type", float, _number)
         self.register("type", int, _whole)
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse what is left over here, where the usage is the command's own."""
+        given, rest = super().parse_known_args(args, namespace)
+        if rest:
+            known = [option for action in self._actions for option in action.option_strings]
+            option = rest[0].partition("=")[0]
+            hint = meant(option, known) if option.startswith("-") else ""
+            self.error(f"unrecognized arguments: {' '.join(rest)}{hint}")
+        return given, rest
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is no choice, with the nearest one."""
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            what = "no command" if isinstance(action, argparse._SubParsersAction) else "invalid choice"
+            message = f"{what}: {str(value)!r:.60}{meant(str(value), known)} (choose from {', '.join(known)})"
+            raise argparse.ArgumentError(action, message)
+
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     parser = Parser(
         prog="udd",
+        usage="udd [--version] [--help] COMMAND ...",
         description="The laboratory of the upward-driven disk: film it, fit it, find what the model lacks.",
-        epilog="Begin with `udd demo`. Each command has its own help: udd discover --help",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"udd {version_of('udd')}")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for command in _COMMANDS:
-        command.add(commands)
+    # The list of commands stands in the groups below.
+    commands = parser.add_subparsers(
+        metavar="COMMAND", required=True, help=argparse.SUPPRESS, parser_class=Parser, prog="udd"
+    )
+    lists = []
+    for group, members in GROUPS.items():
+        before = set(commands.choices)
+        for command in members:
+            command.add(commands)
+        made = [name for name in commands.choices if name not in before]
+        lines = [f"  {name:13} {commands.choices[name].summary}" for name in made]
+        lists.append("\n".join([f"{group}:", *lines]))
+    more = (
+        "Begin with `udd demo`, or `udd example all`. Each command has a help with examples: udd fit --help"
+    )
+    commands.choices["completion"].set_defaults(whole_parser=parser)
+    parser.epilog = "\n\n".join([*lists, more])
     return parser
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from udd.errors import IncompleteWarning, UddError
 
 from .export import TABLES, OutputFile, checked, save_picture
-from .model_options import add_models, check_component, check_count, model_of
+from .model_options import add_models, check_component, check_count, model_of, own_start
 from .options import new, numbers
 from .output import CommandResult
 
@@ -22,7 +22,16 @@ if TYPE_CHECKING:
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Poincare section: where an orbit crosses a surface; the table is CSV."
-    parser = new(commands, "poincare", run, summary)
+    parser = new(
+        commands,
+        "poincare",
+        run,
+        summary,
+        (
+            'udd poincare --w 1 --section "maxima of z" --points 500 --map cusp.png --out maxima.csv',
+            "udd poincare --model own.json --section x --points 20",
+        ),
+    )
     parser.add_argument(
         "--section",
         action="append",
@@ -75,7 +84,7 @@ def run(args: argparse.Namespace) -> CommandResult:
             model,
             args.section,
             args.points,
-            state0=None if args.state is None else numbers([args.state], "--state"),
+            state0=own_start(args) if args.state is None else numbers([args.state], "--state"),
             direction=args.direction,
             transient=args.transient,
             t_max=args.t_max,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from udd.errors import UddError
 
 from .export import TABLES, OutputFile
-from .model_options import add_dle, chosen
+from .model_options import add_dle, add_own, chosen, own_start
 from .options import add_disk, add_pendulum, new, numbers
 from .output import CommandResult
 
@@ -24,7 +24,16 @@ _MOST = 10_000_000  # rows
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = new(commands, "simulate", run, "Run a model from an initial state; the table is CSV.")
+    parser = new(
+        commands,
+        "simulate",
+        run,
+        "Run a model from an initial state; the table is CSV.",
+        (
+            "udd simulate --W 0.039 --t 20 --out run.csv",
+            "udd simulate --model own.json --t 5 --state 1 0",
+        ),
+    )
     add_run(parser, "s; with --w without unit")
     add_dle(parser)
     parser.add_argument(
@@ -41,6 +50,7 @@ def add(commands: Any) -> None:
         help="file to write (.csv or .txt); otherwise standard output",
     )
     add_pendulum(parser)
+    add_own(parser)
 
 
 def add_run(parser: argparse.ArgumentParser, unit: str = "s") -> None:
@@ -102,7 +112,8 @@ def run_model(
     rows = int(length / step + 1e-9) + 1
     if rows > _MOST:
         raise UddError(f"{rows} rows are too many (at most {_MOST}): a longer --dt would do")
-    start = model.profile.shown.run_start if args.state is None else numbers(args.state, "--state")
+    usual = own_start(args) if args.state is None else numbers(args.state, "--state")
+    start = usual or model.profile.shown.run_start
     assert start is not None  # of every model that the command line offers
     return integrated(model, step * np.arange(rows), start, rtol=rtol, atol=atol, dense=dense)
 

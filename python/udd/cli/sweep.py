@@ -11,7 +11,7 @@ from udd.errors import IncompleteWarning, UddError
 
 from .option_names import OPTIONS
 from .options import new
-from .output import CommandResult, is_terminal
+from .output import CommandResult, shown_progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,9 +34,17 @@ A spec in TOML, of the exponents at 1000 drives:
 def add(commands: Any) -> None:
     """Add the command."""
     summary = "Sweep a quantity over a grid; run again, it goes on where it stopped."
-    parser = new(commands, "sweep", run, summary)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = _EXAMPLE
+    parser = new(
+        commands,
+        "sweep",
+        run,
+        summary,
+        (
+            "udd sweep sweep.toml --store exponents.zarr",
+            "udd sweep sweep.toml --store exponents.zarr --json",
+        ),
+        _EXAMPLE,
+    )
     parser.add_argument("spec", type=Path, metavar="SPEC", help="what to compute (TOML or JSON, see below)")
     parser.add_argument(
         "--store", type=Path, required=True, metavar="ZARR", help="folder for the result; made if new"
@@ -61,10 +69,12 @@ def run(args: argparse.Namespace) -> CommandResult:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         if args.dask is None:
-            found = sweep(spec, store=args.store, progress=is_terminal(), partial=True)
+            found = sweep(spec, store=args.store, progress=shown_progress(), partial=True)
         else:
             with _client(args.dask) as client:
-                found = sweep(spec, client.get_executor(), args.store, progress=is_terminal(), partial=True)
+                found = sweep(
+                    spec, client.get_executor(), args.store, progress=shown_progress(), partial=True
+                )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
     unfinished = [w.message for w in said if isinstance(w.message, IncompleteWarning)]

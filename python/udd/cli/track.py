@@ -16,7 +16,7 @@ from udd.errors import UddError
 from .export import PAGES, TABLES, OutputFile, check_ending
 from .inputs import add_partial, is_film, whole
 from .options import new, numbers
-from .output import CommandResult, is_terminal
+from .output import CommandResult, shown_progress
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -24,7 +24,16 @@ if TYPE_CHECKING:
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = new(commands, "track", run, "Measure the motion of the disk in a film; the table is CSV.")
+    parser = new(
+        commands,
+        "track",
+        run,
+        "Measure the motion of the disk in a film; the table is CSV.",
+        (
+            "udd track film.mp4 --out motion.csv",
+            "udd track clock.mp4 --bob red --length 0.8 --out clock.csv",
+        ),
+    )
     parser.add_argument(
         "file",
         type=Path,
@@ -201,7 +210,7 @@ def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
     from udd.tracking import record
 
     seconds = 20.0 if args.seconds is None else args.seconds
-    made = record(args.film, camera=args.camera, seconds=seconds, progress=is_terminal())
+    made = record(args.film, camera=args.camera, seconds=seconds, progress=shown_progress())
     args.file = made.path
     told = {"frames": len(made.t), "lost": made.lost, "gaps_s": made.gaps, "clock": made.clock}
     return f"{made}\nwritten: {made.path}\n", {"recording": {**told, "film": made.path}}
@@ -232,7 +241,7 @@ def _tracked(
     def measure() -> Measurement:
         from udd.tracking.pipeline import Tracking, run_tracker
 
-        found = run_tracker(args.file, progress=is_terminal(), disk_radius=args.disk_radius, **options)
+        found = run_tracker(args.file, progress=shown_progress(), disk_radius=args.disk_radius, **options)
         if not isinstance(found, Tracking):
             return found
         if detail is not None:
