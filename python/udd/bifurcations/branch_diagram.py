@@ -20,6 +20,7 @@ from udd.models import Model
 from .branch import BifurcationPoint, Branch
 from .branch_continuation import continuation
 from .equilibrium_search import equilibria
+from .error_bounds import rounding_of
 from .flow_map import Floats
 from .periodic_orbits import periodic_orbit
 from .solutions import Equilibrium, PeriodicOrbit
@@ -54,8 +55,12 @@ class Diagram(Drawable):
 
     @property
     def points(self) -> tuple[BifurcationPoint, ...]:
-        """The bifurcation points of all branches, by the parameter."""
-        return tuple(sorted((p for branch in self.branches for p in branch.points), key=lambda p: p.value))
+        """The bifurcation points of all branches, by the parameter; one where two branches meet comes once."""
+        points: list[BifurcationPoint] = []
+        for point in sorted((p for branch in self.branches for p in branch.points), key=lambda p: p.value):
+            if not any(_one(point, known) for known in points):
+                points.append(point)
+        return tuple(points)
 
     @property
     def hysteresis(self) -> Floats:
@@ -204,6 +209,12 @@ def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[Periodi
             continue  # what settles too slowly to be a good guess
         found.append((orbit, value))
     return found
+
+
+def _one(a: BifurcationPoint, b: BifurcationPoint) -> bool:
+    """Whether two points are one, or mirror images of each other."""
+    near = abs(a.value - b.value) <= np.nan_to_num(a.error) + np.nan_to_num(b.error) + rounding_of(a.value)
+    return a.kind == b.kind and bool(near) and _same(a.solution, b.solution)
 
 
 def _has(branch: Branch, solution: Equilibrium | PeriodicOrbit, value: float) -> bool:
