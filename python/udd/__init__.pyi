@@ -21,6 +21,7 @@ from .bifurcations import Diagram as Diagram
 from .bifurcations import Equilibrium as Equilibrium
 from .bifurcations import Lifetimes as Lifetimes
 from .bifurcations import Locus as Locus
+from .bifurcations import LocusPoint as LocusPoint
 from .bifurcations import PeriodicOrbit as PeriodicOrbit
 from .bifurcations import cascade as cascade
 from .bifurcations import connection as connection

@@ -16,7 +16,8 @@ from scipy.integrate import solve_ivp
 import udd
 from exact_cycles import symmetric_period
 from lorenz import lorenz
-from udd.bifurcations import bifurcation_curves
+from udd.bifurcations.pseudo_arclength import CorrectorFailed
+from udd.bifurcations.solution_surface import SolutionSurface
 from udd.errors import ModelError
 
 # Values that two or three independent integrators agree on, to the digits that are printed.
@@ -366,9 +367,10 @@ def test_where_rotation_becomes_stable_over_the_damping(rotation: udd.Branch) ->
 def test_a_curve_of_points_that_turns_back_ends(
     rotation: udd.Branch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        bifurcation_curves._Plane, "_across", lambda self, guess, normal, step: 2 * self.start - guess
-    )
+    def lost(*_: object) -> None:
+        raise CorrectorFailed("the curve turns too sharply")
+
+    monkeypatch.setattr(SolutionSurface, "zero", lost)
     curve = udd.locus(rotation.points[0], "B", (0.1, 0.4))
     assert len(curve) == 1 and curve.ends == ("lost: the curve turns too sharply",) * 2
 
@@ -381,7 +383,7 @@ def test_the_fold_of_rotation_over_the_friction_at_rest() -> None:
 
 
 def test_damping_moves_where_the_symmetry_breaks(figure_eight: udd.Branch) -> None:
-    curve = udd.locus(figure_eight.points[0], "B", (0.0, 0.04), max_points=12)
+    curve = udd.locus(figure_eight.points[0], "B", (0.0, 0.04), ds=0.2, ds_max=0.5)
     assert curve.ends == ("the bound 0", "the bound 0.04")
     # The same from a branch at that damping.
     there = udd.continuation(udd.periodic_orbit(udd.DLE(9.0, B=0.04)), "w", (5.0, 12.0))

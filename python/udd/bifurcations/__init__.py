@@ -10,6 +10,7 @@ from .crisis_location import Crisis, crises
 from .cycle_to_equilibrium import CycleConnection, cycle_connections
 from .doubling_cascade import Cascade, cascade
 from .equilibrium_search import equilibria
+from .locus_points import LocusPoint
 from .periodic_orbits import periodic_orbit
 from .solutions import Equilibrium, PeriodicOrbit
 from .transient_lifetimes import Lifetimes, lifetimes
@@ -26,6 +27,7 @@ __all__ = [
     "Equilibrium",
     "Lifetimes",
     "Locus",
+    "LocusPoint",
     "PeriodicOrbit",
     "cascade",
     "connection",

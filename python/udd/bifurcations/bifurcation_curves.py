@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
@@ -14,22 +14,28 @@ from udd._util.keywords import renamed
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
 
-from .bifurcation_functions import FUNCTIONS, test_functions_at
+from .bifurcation_functions import FUNCTIONS
 from .bifurcation_location import frequency_of
-from .branch import AnyCurve, BifurcationPoint
-from .branch_continuation import bounds_of
+from .branch import BifurcationPoint
+from .branch_continuation import bounds_of, in_unit_of, unit_of
+from .branch_ends import hopf_end, vanishing_part
+from .branch_following import CLOSED
 from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
+from .locus_points import ENDS, LocusPoint, Segment, points_between, watched_functions
+from .pseudo_arclength import CorrectorFailed
 from .shooting_curve import PeriodicOrbitCurve
+from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["Locus", "locus"]
 
-_EXACT = 1e-13  # of the parameters, relative to their units
-_TURN = 0.9  # least cosine between one direction in the plane and the next
-_SHORTEST = 1e-5  # step
+_TURN = 0.9  # least cosine between one direction and the next
+_SHORTEST = 1e-6  # step
+_BESIDE = 0.02  # a step along a curve of Hopf points, on which a Bautin point is looked for,
+_TRIED = 40  # and how many
+_LOOP = 8  # points at least of a closed curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +57,8 @@ class Locus(Drawable):
         Of Hopf bifurcations: where it changes its sign cycles are born stable on one side.
     ends : tuple of str
         Why the curve ends, at its beginning and at its end.
+    points : tuple of LocusPoint
+        Cusps, Bogdanov-Takens points and others at which it changes, in their order along the curve.
     """
 
     kind: str
@@ -60,15 +68,19 @@ class Locus(Drawable):
     frequencies: Floats
     lyapunov_coefficients: Floats
     ends: tuple[str, str]
+    points: tuple[LocusPoint, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values)
 
     def __repr__(self) -> str:
         (a, b), (p, q) = self.values[[0, -1]], self.parameters
+        special = "".join(
+            f"; {point.kind} at ({point.values[0]:.10g}, {point.values[1]:.10g})" for point in self.points
+        )
         return (
             f"<Locus of {self.kind} over {p} and {q}: {len(self)} points from ({a[0]:.6g}, {a[1]:.6g}) to "
-            f"({b[0]:.6g}, {b[1]:.6g})>"
+            f"({b[0]:.6g}, {b[1]:.6g}){special}>"
         )
 
 
@@ -82,7 +94,7 @@ def locus(
     within: Sequence[float] = (0.0, np.inf),
     ds: float = 0.05,
     ds_max: float = 0.2,
-    max_points: int = 200,
+    max_points: int = 1000,
 ) -> Locus:
     """Follow a bifurcation point over a second parameter.
 
@@ -96,7 +108,8 @@ def locus(
     bounds, within : (float, float)
         The curve ends where the second or the first parameter leaves these bounds.
     ds, ds_max : float
-        The first and the longest step, in units of the parameters' values at the point.
+        The first and the longest step, in arclength: states count in typical sizes, a parameter in fifths of
+        the way between its bounds, or in units of its value at the point if a bound is infinite.
     max_points : int
         Points at most, in either direction.
 
@@ -111,10 +124,12 @@ def locus(
 
     Notes
     -----
-    At every pair of parameters the equilibrium or cycle is solved for, and the function whose zero makes the
-    bifurcation is evaluated; the curve of its zeros is followed in the plane of the parameters, each point
-    located by the secant method across the curve. A fold is located along its branch, for one value of
-    the second parameter after the other: its curve ends where it turns back in that parameter.
+    Equilibria or cycles over two parameters are a surface, on which the zeros of the function that makes the
+    bifurcation are a curve. It is followed by its arclength in the tangent planes of the surface, each point
+    located by the secant method across the curve. So folds go on through cusps. Zeros of the coefficients of
+    the normal form along the curve are located by Brent's method: cusps, Bogdanov-Takens points (where curves
+    of Hopf points end), Bautin points (the first Lyapunov coefficient is zero) and zero-Hopf points. Bounds
+    come from the scatter of the values near by.
 
     Examples
     --------
@@ -144,177 +159,180 @@ def locus(
     ds = number("ds", ds, above=0.0)
     ds_max = max(ds, number("ds_max", ds_max, above=0.0))
     max_points = whole("max_points", max_points, 1)
-    along = _Fold if point.kind == "fold" else _Plane
-    ways = []
-    for sense in (-1.0, 1.0):
-        ways.append(along(point, second, box).follow(sense, ds, ds_max, max_points))
-    (back, first), (on, last) = ways
-    found = [*back[:0:-1], *on]
-    values = np.array([value for value, _, _ in found])
-    solutions = tuple(solution for _, solution, _ in found)
-    frequencies = np.array([frequency for _, _, frequency in found])
+    scaled = in_unit_of(point, *box[0])
+    assert scaled._curve is not None and scaled._place is not None
+    surface = SolutionSurface(scaled._curve, second, unit_of(start[1], *box[1]))
+    way = _Way(surface, point.kind, box, ds, ds_max, max_points)
+    try:
+        begin = surface.start(scaled._place)
+        back = way.follow(begin, -1.0)
+        on = _Trace([_note(surface, point.kind, begin)], []) if back.end == CLOSED else way.follow(begin, 1.0)
+    except (CorrectorFailed, IntegrationError) as error:
+        raise ModelError(f"the point cannot be followed: {error}") from None
+    found = [*back.notes[:0:-1], *on.notes]
+    solutions = tuple(note.solution for note in found)
     coefficients = [s.lyapunov_coefficient if isinstance(s, Equilibrium) else np.nan for s in solutions]
     return Locus(
         point.kind,
         (point.parameter, parameter),
-        values,
+        np.array([note.values for note in found]),
         solutions,
-        frequencies,
+        np.array([note.frequency for note in found]),
         np.array(coefficients),
-        (first, last),
+        (back.end, on.end or back.end),
+        (*back.points[::-1], *on.points),
     )
 
 
-_Found = tuple[Floats, Equilibrium | PeriodicOrbit, float]
+@dataclass(frozen=True, eq=False)
+class _Note:
+    """What a locus says of one of its points."""
+
+    values: Floats
+    solution: Equilibrium | PeriodicOrbit
+    frequency: float
 
 
-class _Plane:
-    """The zeros of a function over the plane of two parameters, in units of their first values."""
+@dataclass
+class _Trace:
+    """What was met on the way, and why it ends."""
 
-    def __init__(self, point: BifurcationPoint, second: int, box: Floats) -> None:
-        curve, place = point._curve, point._place
-        assert curve is not None and place is not None  # checked by the caller
-        self.name, self.second = FUNCTIONS[point.kind], second
-        values = curve.values_at(place.u)
-        self.curve: AnyCurve = replace(curve, values=values)
-        self.place = place
-        pair = values[[curve.parameter, second]]
-        self.unit = np.where(pair != 0.0, np.abs(pair), 1.0)
-        self.start, self.box = pair / self.unit, box
+    notes: list[_Note]
+    points: list[LocusPoint]
+    end: str = ""
 
-    def solve(self, p: Floats) -> CurvePoint:
-        """The solution at these scaled parameters, from the one before."""
-        first, second = p * self.unit
-        self.curve.values[self.second] = second
-        if isinstance(self.curve, PeriodicOrbitCurve):
-            self.curve.seen = None
-        guess = self.place.u.copy()
-        guess[-1] = first / self.curve.scale
-        row = natural_constraint(guess)
-        return CurvePoint(newton_corrector(self.curve, guess, row), row)
 
-    def value(self, p: Floats) -> float:
-        """The function at these scaled parameters."""
-        return float(getattr(test_functions_at(self.curve, self.solve(p)), self.name))
+def _note(surface: SolutionSurface, kind: str, point: SurfacePoint) -> _Note:
+    u, frequency = point.v[:-1], float("nan")
+    if FUNCTIONS[kind] == "complex_pair":
+        frequency = frequency_of(point.curve, u, point.functions)
+    return _Note(surface.values(point), solution_at(point.curve, u), frequency)
 
-    def follow(self, sense: float, step: float, longest: float, most: int) -> tuple[list[_Found], str]:
-        """Points from the start on, and why they end; `sense` is that of the second parameter at first."""
-        p, direction = self.start, np.array([0.0, sense])
-        found = [self._found(p)]
-        while len(found) <= most:
+
+def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> list[LocusPoint]:
+    """The Bautin point near a small cycle at its fold, along the curve of Hopf points."""
+    curve = point.curve
+    hopf = hopf_end(curve, point.v[:-1]) if isinstance(curve, PeriodicOrbitCurve) else None
+    if hopf is None or hopf._curve is None or hopf._place is None:
+        return []
+    rests = SolutionSurface(hopf._curve, surface.second, surface.scale)
+    way = _Way(rests, "Hopf", box, _BESIDE, _BESIDE, _TRIED)
+    found = [one for sense in (1.0, -1.0) for one in way.follow(rests.start(hopf._place), sense).points]
+    found = [one for one in found if one.kind == "Bautin"]
+    here = surface.values(point)
+    return sorted(found, key=lambda one: float(np.abs(one.values - here).max()))[:1]
+
+
+@dataclass(frozen=True)
+class _Way:
+    """How a curve of bifurcations is followed on the surface of solutions."""
+
+    surface: SolutionSurface
+    kind: str
+    box: Floats
+    step: float
+    longest: float
+    most: int
+
+    def follow(self, start: SurfacePoint, sense: float) -> _Trace:
+        """Points from the start on; `sense` is that of the second parameter at first."""
+        surface, name = self.surface, FUNCTIONS[self.kind]
+        here, step, along = start, self.step, np.zeros_like(start.v)
+        along[-1] = sense
+        trace = _Trace([_note(surface, self.kind, start)], [])
+        first = np.zeros_like(start.v)
+        watched: dict[str, float] | None = None
+        while len(trace.notes) <= self.most:
             try:
-                small = 1e-5
-                slope = np.array([(self.value(p + small * e) - self.value(p - small * e)) for e in np.eye(2)])
+                here = surface.fix_phase(here)
+                slope = surface.slope(here, name)
+                before = watched_functions(self.kind, surface, here, slope) if watched is None else watched
             except (CorrectorFailed, IntegrationError) as error:
-                return found, f"lost: {error}"
+                trace.end = f"lost: {error}"
+                return trace
             normal = slope / np.linalg.norm(slope)
-            along = np.array([-normal[1], normal[0]])
-            along *= np.sign(along @ direction) or 1.0
-            while True:
-                reason = "the curve turns too sharply"
+            ahead = here.ahead(np.array([-normal[1], normal[0]]))
+            ahead = ahead * (np.sign(ahead @ along) or 1.0)
+            first = first if first.any() else ahead
+            there, reason = None, "the curve turns too sharply"
+            while there is None and step >= _SHORTEST:
                 try:
-                    there = self._across(p + step * along, normal, step)
-                    way = (there - p) / np.linalg.norm(there - p)
-                    if way @ along > _TURN:
-                        break
-                except (CorrectorFailed, IntegrationError, RuntimeError, ValueError) as error:
-                    reason = str(error)
-                step *= 0.5
-                if step < _SHORTEST:
-                    return found, f"lost: {reason}"
-            outside = (there * self.unit < self.box[:, 0]) | (there * self.unit > self.box[:, 1])
-            if outside.any():
-                k = int(np.flatnonzero(outside)[0])
-                bound = self.box[k, 0] if there[k] * self.unit[k] < self.box[k, 0] else self.box[k, 1]
-                return [*found, *self._at_bound(p, there, k, bound)], f"the bound {bound:.6g}"
-            p, direction = there, way
-            found.append(self._found(p))
-            step = min(longest, 1.4 * step)
-        return found, "as many points as were wanted"
+                    there = surface.zero(here, here.v + step * ahead, normal, name, step)
+                    gone = there.v - here.v
+                    slope = surface.slope(there, name)
+                    after = watched_functions(self.kind, surface, there, slope)
+                    if not gone @ ahead > _TURN * np.linalg.norm(gone):
+                        there = None
+                except (CorrectorFailed, IntegrationError) as error:
+                    there, reason = None, str(error)
+                step = step if there is not None else 0.5 * step
+            if there is None:
+                trace.end = f"lost: {reason}"
+                return trace
+            if vanishing_part(here.curve, here.v[:-1], there.v[:-1]) is not None:
+                # Folds of cycles are born at a Bautin point, where the cycles have no size.
+                points = _bautin_near(here, surface, self.box) if self.kind == "fold" else []
+                trace.points += points
+                trace.end = "a Bautin point" if points else "lost: the cycles shrink to an equilibrium"
+                return trace
+            segment = Segment(surface, name, here, normal, there)
+            outside = self._outside(there)
+            last = self._at_bounds(segment, outside)
+            for part, point in points_between(self.kind, segment, before, after):
+                if outside and (last is None or part > last[0]):
+                    continue
+                trace.points.append(point)
+                if point.kind in ENDS.get(self.kind, ()):
+                    trace.notes.append(_Note(point.values, point.solution, 0.0))
+                    trace.end = f"a {point.kind} point"
+                    return trace
+            if outside:
+                trace.end = f"the bound {outside[0][1] if last is None else last[1]:.6g}"
+                if last is not None:
+                    trace.notes.append(_note(surface, self.kind, last[2]))
+                return trace
+            passed = (here.v - start.v) @ first < 0.0 <= (there.v - start.v) @ first
+            near = np.linalg.norm(there.v - start.v) < 1.5 * np.linalg.norm(there.v - here.v)
+            if len(trace.notes) > _LOOP and passed and near:
+                trace.notes.append(_note(surface, self.kind, there))
+                trace.end = CLOSED
+                return trace
+            here, along, watched = there, there.v - here.v, after
+            trace.notes.append(_note(surface, self.kind, here))
+            step = min(self.longest, 1.4 * step)
+        trace.end = "as many points as were wanted"
+        return trace
 
-    def _across(self, guess: Floats, normal: Floats, step: float) -> Floats:
-        root = optimize.root_scalar(
-            lambda n: self.value(guess + n * normal), method="secant", x0=0.0, x1=0.05 * step, xtol=_EXACT
-        )
-        if not root.converged or abs(root.root) > step:
-            raise CorrectorFailed("the curve turns too sharply")
-        there: Floats = guess + root.root * normal
-        return there
+    def _outside(self, point: SurfacePoint) -> list[tuple[int, float]]:
+        """The parameters that have left their bounds, and which bounds."""
+        pairs = zip(self.surface.values(point).tolist(), self.box.tolist(), strict=True)
+        return [
+            (k, low if value < low else high)
+            for k, (value, (low, high)) in enumerate(pairs)
+            if not low <= value <= high
+        ]
 
-    def _at_bound(self, p: Floats, there: Floats, k: int, bound: float) -> list[_Found]:
-        """The point where the curve meets a bound of parameter `k`."""
-        part = (bound / self.unit[k] - p[k]) / (there[k] - p[k])
-        guess, other = p + part * (there - p), np.eye(2)[1 - k]
-        if np.abs(guess - p).max() < 1e-9:
-            return []  # it begins on the bound
+    def _at_bounds(
+        self, segment: Segment, outside: list[tuple[int, float]]
+    ) -> tuple[float, float, SurfacePoint] | None:
+        """The part of a step after which the curve first meets a bound, the bound and the point there."""
+        met = [(self._at_bound(segment, k, bound), bound) for k, bound in outside]
+        places = [(one[0], bound, one[1]) for one, bound in met if one is not None]
+        return min(places, key=lambda place: place[0], default=None)
+
+    def _at_bound(self, segment: Segment, k: int, bound: float) -> tuple[float, SurfacePoint] | None:
+        """The part of a step after which the curve meets a bound of parameter `k`, and the point there."""
+        places: dict[float, SurfacePoint] = {}
+
+        def beyond(part: float) -> float:
+            places[part] = segment.at(part)
+            return float(self.surface.values(places[part])[k] - bound)
+
         try:
-            return [self._found(self._across(guess, other, float(np.linalg.norm(there - p))))]
-        except (CorrectorFailed, IntegrationError, RuntimeError, ValueError):
-            return []
-
-    def _found(self, p: Floats) -> _Found:
-        self.place = self.solve(p)
-        if isinstance(self.curve, PeriodicOrbitCurve):
-            self.curve.fix_phase(self.place.u)
-        frequency = float("nan")
-        if self.name == "complex_pair":
-            frequency = frequency_of(self.curve, self.place.u, test_functions_at(self.curve, self.place))
-        return p * self.unit, solution_at(self.curve, self.place.u), frequency
-
-
-class _Fold(_Plane):
-    """Folds, each located along its branch at one value of the second parameter."""
-
-    def follow(self, sense: float, step: float, longest: float, most: int) -> tuple[list[_Found], str]:
-        second, end = float(self.start[1]), "as many points as were wanted"
-        bound = self.box[1, 0 if sense < 0 else 1] / self.unit[1]
-        found: list[_Found] = [self._here()]
-        while len(found) <= most:
-            trial = second + sense * step
-            last = (trial - bound) * sense >= 0.0
-            trial = bound if last else trial
-            before = self.place
-            try:
-                self._to(trial)
-            except (CorrectorFailed, IntegrationError, RuntimeError, ValueError) as error:
-                self.place = before
-                step *= 0.5
-                if step < _SHORTEST:
-                    end = f"lost, where the curve may turn: {error}"
-                    break
-                continue
-            second = trial
-            here = self._here()
-            if not self.box[0, 0] <= here[0][0] <= self.box[0, 1]:
-                end = "a bound of the first parameter"
-                break
-            found.append(here)
-            if last:
-                end = f"the bound {bound * self.unit[1]:.6g}"
-                break
-            step = min(longest, 1.4 * step)
-        return found, end
-
-    def _to(self, second: float) -> None:
-        """The fold at this value of the second parameter, from the one before."""
-        self.curve.values[self.second] = second * self.unit[1]
-        if isinstance(self.curve, PeriodicOrbitCurve):
-            self.curve.seen = None
-        start, places = self.place, {}
-
-        def at(sigma: float) -> float:
-            u = newton_corrector(self.curve, start.u + sigma * start.tangent, start.tangent)
-            places[sigma] = CurvePoint(u, tangent_at(self.curve, u, start.tangent))
-            return float(places[sigma].tangent[-1])
-
-        root = optimize.root_scalar(at, method="secant", x0=0.0, x1=1e-3, xtol=1e-12)
-        if not root.converged or abs(root.root) > 0.3:
-            raise CorrectorFailed("the fold moves too far")
-        at(root.root)
-        self.place = places[root.root]
-        if isinstance(self.curve, PeriodicOrbitCurve):
-            self.curve.fix_phase(self.place.u)
-
-    def _here(self) -> _Found:
-        value = np.array([self.curve.value(self.place.u), self.curve.values[self.second]])
-        return value, solution_at(self.curve, self.place.u), float("nan")
+            if abs(beyond(0.0)) <= 1e-12 * (abs(bound) or 1.0):
+                return None  # it begins on the bound
+            part = float(optimize.brentq(beyond, 0.0, 1.0, xtol=1e-14))
+            beyond(part)
+        except (CorrectorFailed, IntegrationError, ValueError, RuntimeError):
+            return None
+        return part, places[part]

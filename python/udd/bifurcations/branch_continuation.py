@@ -27,7 +27,7 @@ from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, n
 from .shooting_curve import HELD, PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["bounds_of", "branch_from", "continuation"]
+__all__ = ["bounds_of", "branch_from", "continuation", "in_unit_of", "unit_of"]
 
 
 @renamed(step="ds", longest="ds_max", most="max_points", period="max_period")
@@ -131,7 +131,7 @@ def continuation(
     ds_max = max(number("ds_max", ds_max, above=0.0), ds)
     if isinstance(start, BifurcationPoint):
         size = number("amplitude", amplitude, above=0.0)
-        curve, place, off = born_at(_in_unit_of(start, low, high), size)
+        curve, place, off = born_at(in_unit_of(start, low, high), size)
         ds *= min(1.0, off / size)
         model = start.solution.model
     else:
@@ -174,7 +174,7 @@ def unit_of(value: float, low: float, high: float) -> float:
     return (high - low) / 5.0 if np.isfinite(high - low) else abs(value) or 1.0
 
 
-def _in_unit_of(point: BifurcationPoint, low: float, high: float) -> BifurcationPoint:
+def in_unit_of(point: BifurcationPoint, low: float, high: float) -> BifurcationPoint:
     """The point with its parameter in the unit of these bounds; as it is if one of them is infinite."""
     curve, place = point._curve, point._place
     if curve is None or place is None or isinstance(curve, FamilyCurve) or not np.isfinite(high - low):

@@ -55,7 +55,7 @@ class Diagram(Drawable):
 
     @property
     def points(self) -> tuple[BifurcationPoint, ...]:
-        """The bifurcation points of all branches, by the parameter; one where two branches meet comes once."""
+        """The bifurcation points of all branches, by the parameter; where two branches meet, one."""
         points: list[BifurcationPoint] = []
         for point in sorted((p for branch in self.branches for p in branch.points), key=lambda p: p.value):
             if not any(_one(point, known) for known in points):

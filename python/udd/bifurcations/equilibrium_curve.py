@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,11 +50,23 @@ class EquilibriumCurve:
     values: Floats
     parameter: int
     scale: float
+    second: int = -1
     _rates: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         # Rates are compared with what crosses the typical size in the typical time.
         self._rates = self.flow.clock / self.flow.size
+
+    def with_second(self, index: int, value: float) -> EquilibriumCurve:
+        """The curve at another value of a second parameter, by which derivatives are wanted too."""
+        values = self.values.copy()
+        values[index] = value
+        return replace(self, values=values, second=index)
+
+    def by_second(self, u: Floats, scale: float) -> Floats:
+        """The scaled rates' derivatives by the second parameter, in these units of it."""
+        column: Floats = self.at(u).by_parameter[self.second] * self._rates * scale
+        return column
 
     def pack(self, x: Floats, value: float) -> Floats:
         """Unknowns from a state and the parameter's value."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,6 +54,8 @@ class PeriodicOrbitCurve:
         The nodes of the reference orbit, and the weights of the nodes' distances from them.
     share : float
         Of a forced model: after how many of the forcing's periods the orbit closes.
+    second : int
+        The index of another parameter by which derivatives are wanted, `HELD` for none.
     """
 
     flow: FlowMap
@@ -67,8 +69,15 @@ class PeriodicOrbitCurve:
     reference: Floats
     across: Floats
     share: float = 1.0
+    second: int = HELD
     loose: float = 1.0
     seen: tuple[Floats, SegmentEnds] | None = field(default=None, init=False)
+
+    def with_second(self, index: int, value: float) -> PeriodicOrbitCurve:
+        """The curve at another value of a second parameter, by which derivatives are wanted too."""
+        values = self.values.copy()
+        values[index] = value
+        return replace(self, values=values, second=index)
 
     def pack(self, nodes: Floats, span: float, value: float) -> Floats:
         """Unknowns from nodes (m, r), the time and the parameter's value."""
@@ -139,7 +148,7 @@ class PeriodicOrbitCurve:
         """Where the pieces end, with derivatives by the parameter."""
         if self.seen is None or not np.array_equal(self.seen[0], u):
             spans = np.full(self.pieces, self.span(u) / self.pieces)
-            wanted = () if self.parameter == HELD else (self.parameter,)
+            wanted = tuple(index for index in (self.parameter, self.second) if index != HELD)
             found = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, self.loose, self.begins(u))
             self.seen = u.copy(), found
         return self.seen[1]
@@ -183,6 +192,17 @@ class PeriodicOrbitCurve:
             return residual, dense
         both = np.stack([by_span, by_value], axis=2)
         return residual, CyclicEquations(by_state, 1.0 / weight, both, along, last)
+
+    def by_second(self, u: Floats, scale: float) -> Floats:
+        """The equations' derivatives by the second parameter, in these units of it."""
+        turn = np.ones((self.pieces, self.flow.dim))
+        turn[-1] = self.mirror
+        by_value = self.flight(u).by_parameter[:, :, 1] * turn / self.flow.size * scale
+        phase, forcing = 0.0, self.flow.forcing
+        if forcing is not None:
+            by_values = forcing.period(self.values_at(u))[1]
+            phase = -self.share * float(by_values[self.second]) * scale / self.clock
+        return np.append(by_value.ravel(), phase)
 
     def _rates_at_nodes(self, u: Floats) -> Floats:
         model = self.flow.with_values(self.values_at(u))

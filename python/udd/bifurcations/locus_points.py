@@ -1,0 +1,286 @@
+"""Points of a curve of bifurcations at which it changes: kinds, places, normal forms and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import optimize
+
+from udd.errors import IntegrationError
+
+from .branch_solutions import solution_at
+from .equilibrium_curve import EquilibriumCurve, expansion
+from .error_bounds import COARSE, rounding_of
+from .flow_map import Floats
+from .normal_forms import (
+    Derivatives,
+    bogdanov_takens_coefficients,
+    cusp_coefficient,
+    first_lyapunov_coefficient,
+    second_lyapunov_coefficient,
+    zero_hopf_coefficients,
+)
+from .pseudo_arclength import CorrectorFailed
+from .shooting_curve import PeriodicOrbitCurve
+from .solution_surface import SolutionSurface, SurfacePoint
+from .solutions import Equilibrium, PeriodicOrbit
+
+__all__ = ["ENDS", "LocusPoint", "Segment", "points_between", "watched_functions"]
+
+_NEAR = 1e-4  # radians in a typical time, or from 1: a pair that is so near to being real is real
+_ZERO = 1e-3  # of its values before and after, below which a function is zero where it changes its sign
+_SAMPLES = 8  # points about a special one, in which rounding shows
+_ASIDE = 1e-3  # of the segment
+_SURE = 2.0  # how far beyond the largest scatter the error may lie
+
+#: Kinds at which a curve ends: beyond, its points are no bifurcations of its kind.
+ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("1:1 resonance", "1:2 resonance")}
+
+
+@dataclass(frozen=True, eq=False)
+class LocusPoint:
+    """A point of a curve of bifurcations at which two conditions hold at a time (of codimension two).
+
+    Attributes
+    ----------
+    kind : str
+        Of equilibria "cusp", "Bogdanov-Takens", "Bautin" and "zero-Hopf"; of cycles "cusp", "1:1 resonance",
+        "1:2 resonance", "fold-flip", "fold-Neimark-Sacker" and "flip-Neimark-Sacker".
+    parameters : tuple of str
+    values, errors : ndarray, shape (2,)
+        The parameters' values, and bounds of their errors.
+    solution : Equilibrium or PeriodicOrbit
+    coefficients, coefficient_errors : dict of str to float
+        Those of the normal form, with bounds: "c" of a cusp, "a" and "b" of a Bogdanov-Takens point, "l2"
+        (the second Lyapunov coefficient) of a Bautin point, "s" and "theta" of a zero-Hopf point; empty for
+        cycles.
+    """
+
+    kind: str
+    parameters: tuple[str, str]
+    values: Floats
+    errors: Floats
+    solution: Equilibrium | PeriodicOrbit
+    coefficients: dict[str, float]
+    coefficient_errors: dict[str, float]
+    _surface: SolutionSurface | None = field(default=None, repr=False)
+    _place: SurfacePoint | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        pairs = zip(self.parameters, self.values, self.errors, strict=True)
+        where = ", ".join(f"{name} = {value:.12g} (error below {error:.1g})" for name, value, error in pairs)
+        numbers = "".join(f", {name} = {value:.6g}" for name, value in self.coefficients.items())
+        return f"<{self.kind} at {where}{numbers}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A step along a curve of zeros of a test function, from one point of the surface to the next."""
+
+    surface: SolutionSurface
+    name: str
+    begin: SurfacePoint
+    normal: Floats
+    end: SurfacePoint
+
+    @property
+    def length(self) -> float:
+        """The distance of the two points, in scaled unknowns."""
+        return float(np.linalg.norm(self.end.v - self.begin.v))
+
+    def at(self, part: float) -> SurfacePoint:
+        """The point of the curve at a part of the way.
+
+        Raises
+        ------
+        CorrectorFailed
+        """
+        if part == 0.0:
+            return self.begin
+        guess = self.begin.v + part * (self.end.v - self.begin.v)
+        # Where the surface is bent the guess lies off it by the square of the step.
+        return self.surface.zero(self.begin, guess, self.normal, self.name, self.length)
+
+
+def watched_functions(
+    kind: str, surface: SolutionSurface, point: SurfacePoint, slope: Floats
+) -> dict[str, float]:
+    """The functions whose zeros are special points of a curve, by name; `slope` is that of its function."""
+    signs = point.functions
+    if kind == "fold":
+        found = {
+            "bend": slope[0],
+            "complex_pair": signs.complex_pair,
+            "period_doubling": signs.period_doubling,
+        }
+    elif kind == "Hopf":
+        found = {"unit_multiplier": signs.unit_multiplier, "lyapunov": _first_lyapunov(point)}
+    elif kind == "Neimark-Sacker":
+        found = {"unit_multiplier": signs.unit_multiplier, "period_doubling": signs.period_doubling}
+    else:
+        found = {"unit_multiplier": signs.unit_multiplier, "complex_pair": signs.complex_pair}
+    return found
+
+
+def _function(kind: str, name: str, segment: Segment) -> Callable[[SurfacePoint], float]:
+    def value(point: SurfacePoint) -> float:
+        if name != "bend":
+            return watched_functions(kind, segment.surface, point, np.zeros(2))[name]
+        if isinstance(point.curve, EquilibriumCurve):
+            return _bend(point)
+        return float(segment.surface.slope(point, segment.name)[0])
+
+    return value
+
+
+def _bend(point: SurfacePoint) -> float:
+    """How fast the first parameter's slope changes along a branch at its fold."""
+    curve, place = point.curve, point.place
+    assert isinstance(curve, EquilibriumCurve)
+    at, size = _derivatives(curve, place.u), curve.flow.size
+    along = place.tangent[:-1] * size
+    left = np.linalg.svd(at.by_state / size[:, None] * size)[0][:, -1]
+    by_value = curve.at(place.u).by_parameter[curve.parameter] * curve.scale
+    return -float(left @ (at.b(along, along) / size)) / float(left @ (by_value / size))
+
+
+def _derivatives(curve: EquilibriumCurve, u: Floats) -> Derivatives:
+    found = expansion(curve.flow, curve.values_at(u), curve.state(u), higher=True)
+    return Derivatives(found.by_state, found.second, found.third)
+
+
+def _first_lyapunov(point: SurfacePoint) -> float:
+    curve = point.curve
+    if not isinstance(curve, EquilibriumCurve):
+        return float("nan")
+    at = _derivatives(curve, point.v[:-1])
+    return first_lyapunov_coefficient(at.by_state, at.second, at.third)
+
+
+def points_between(
+    kind: str, segment: Segment, before: dict[str, float], after: dict[str, float]
+) -> list[tuple[float, LocusPoint]]:
+    """The special points on a step between whose ends these functions change their signs, in order."""
+    changed = [name for name, value in before.items() if value * after[name] < 0.0]
+    found = []
+    for name in changed:
+        if name == "lyapunov" and "unit_multiplier" in changed:
+            continue  # it may pass infinity there
+        function = _function(kind, name, segment)
+        try:
+            part, place = _zero(segment, function)
+        except (CorrectorFailed, IntegrationError, ValueError, RuntimeError):
+            continue
+        if not abs(function(place)) <= _ZERO * max(abs(before[name]), abs(after[name])):
+            continue
+        what = _named(kind, name, place)
+        if what:
+            found.append((part, _point(what, segment, part, place, function)))
+    return sorted(found, key=lambda one: one[0])
+
+
+def _zero(segment: Segment, function: Callable[[SurfacePoint], float]) -> tuple[float, SurfacePoint]:
+    """The part of a step after which a function is zero, and the point there, by Brent's method."""
+    part = float(
+        optimize.brentq(lambda x: function(segment.at(x)), 0.0, 1.0, xtol=1e-14, rtol=1e-13, maxiter=60)
+    )
+    return part, segment.at(part)
+
+
+def _named(kind: str, name: str, point: SurfacePoint) -> str:
+    """The kind of the special point at which a function is zero; "" where nothing bifurcates."""
+    if name in ("bend", "lyapunov"):
+        return "cusp" if name == "bend" else "Bautin"
+    values, clock = point.functions.values, point.curve.flow.clock
+    if isinstance(point.curve, EquilibriumCurve):
+        others = np.delete(values, np.argmin(np.abs(values))) * clock
+        if np.abs(others).min(initial=np.inf) < _NEAR:
+            return "Bogdanov-Takens"
+        pair = others[np.abs(others.imag) > _NEAR]
+        return "zero-Hopf" if len(pair) and np.abs(pair.real).min() < _NEAR else ""
+    number = -1.0 if kind in ("period doubling", "symmetry breaking") else 1.0
+    if kind == "Neimark-Sacker":
+        number = 1.0 if name == "unit_multiplier" else -1.0
+        pair = values[np.abs(values.imag) > 0.0]
+        real = values[np.abs(values.imag) == 0.0]
+        if np.abs(real - number).min(initial=np.inf) < np.abs(pair - number).min(initial=np.inf):
+            return "fold-Neimark-Sacker" if number > 0.0 else "flip-Neimark-Sacker"
+        return "1:1 resonance" if number > 0.0 else "1:2 resonance"
+    if name in ("period_doubling", "unit_multiplier"):
+        return "fold-flip"
+    others = np.delete(values, np.argmin(np.abs(values - number)))
+    if np.abs(others - number).min(initial=np.inf) < _NEAR**0.5:
+        return "1:1 resonance" if number > 0.0 else "1:2 resonance"
+    pair = others[np.abs(others.imag) > _NEAR]
+    if len(pair) and np.abs(np.abs(pair) - 1.0).min() < _NEAR:
+        return "fold-Neimark-Sacker" if number > 0.0 else "flip-Neimark-Sacker"
+    return ""
+
+
+def _coefficients(kind: str, point: SurfacePoint) -> dict[str, float]:
+    """The normal form's coefficients."""
+    curve, u = point.curve, point.v[:-1]
+    if not isinstance(curve, EquilibriumCurve):
+        return {}
+    at = _derivatives(curve, u)
+    if kind == "cusp":
+        return {"c": cusp_coefficient(at)}
+    if kind == "Bogdanov-Takens":
+        return dict(zip("ab", bogdanov_takens_coefficients(at), strict=True))
+    if kind == "zero-Hopf":
+        return dict(zip(("s", "theta"), zero_hopf_coefficients(at), strict=True))
+    flow, values = curve.flow, curve.values_at(u)
+
+    def derivatives(x: Floats) -> Derivatives:
+        found = expansion(flow, values, x, higher=True)
+        return Derivatives(found.by_state, found.second, found.third)
+
+    return {"l2": second_lyapunov_coefficient(derivatives, curve.state(u), flow.size)}
+
+
+def _point(
+    kind: str, segment: Segment, part: float, place: SurfacePoint, function: Callable[[SurfacePoint], float]
+) -> LocusPoint:
+    surface = segment.surface
+    numbers, curve = _coefficients(kind, place), place.curve
+    known = np.array([*surface.values(place), *numbers.values()])
+    try:
+        errors = _scatter(kind, segment, part, function) + rounding_of(known)
+    except (CorrectorFailed, IntegrationError, ValueError, np.linalg.LinAlgError):
+        errors = np.full(len(known), np.nan)
+    names = curve.name, curve.flow.names[surface.second]
+    bounds = dict(zip(numbers, errors[2:].tolist(), strict=True))
+    solution = solution_at(curve, place.v[:-1])
+    return LocusPoint(kind, names, known[:2], errors[:2], solution, numbers, bounds, surface, place)
+
+
+def _scatter(kind: str, segment: Segment, part: float, function: Callable[[SurfacePoint], float]) -> Floats:
+    """Bounds of the errors of both parameters and of the coefficients.
+
+    From how the values near by scatter about a smooth curve; of cycles also how far they move if the runs are
+    less accurate.
+    """
+    near = np.linspace(-1.0, 1.0, _SAMPLES)
+
+    def seen(where: float) -> list[float]:
+        point = segment.at(where)
+        return [function(point), *segment.surface.values(point), *_coefficients(kind, point).values()]
+
+    table, powers = np.array([seen(part + _ASIDE * x) for x in near]), np.vander(near, 4)
+    fitted = np.linalg.lstsq(powers, table, rcond=None)[0]
+    noise, slope = np.abs(powers @ fitted - table).max(axis=0), np.abs(fitted[2])
+    gap = noise[0]
+    if isinstance(segment.surface.curve, PeriodicOrbitCurve):
+        here = seen(part)
+        segment.surface.curve.loose = COARSE
+        try:
+            moved = np.abs(np.array(seen(part)) - here)
+        finally:
+            segment.surface.curve.loose = 1.0
+        gap, noise = gap + moved[0], noise + moved
+    off = gap / slope[0] if slope[0] > gap else np.nan
+    # The slope counts in samples' distances, and so does this distance from the zero.
+    bounds: Floats = _SURE * (noise[1:] + off * slope[1:])
+    return bounds

@@ -1,0 +1,138 @@
+"""Curves of bifurcations over two parameters, and the points at which they change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import udd
+
+CO = udd.Model(
+    ["x", "y", "s"],
+    [
+        "2*q1*(1 - x - y - s)^2 - 2*q5*x^2 - q3*x*y",
+        "q2*(1 - x - y - s) - q6*y - q3*x*y",
+        "q4*(1 - x - y - s) - k*q4*s",
+    ],
+    {"q1": 2.5, "q2": 1.04, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4},
+)
+BAZYKIN = udd.Model(
+    ["x", "y"],
+    ["x - x*y/(1 + al*x) - e*x^2", "-g*y + x*y/(1 + al*x) - d*y^2"],
+    {"e": 0.01, "g": 1.0, "d": 0.1, "al": 0.2},
+)
+REACTION = udd.Model(
+    ["u", "v"],
+    ["-u + p1*(1 - u)*exp(v)", "-v + p1*p2*(1 - u)*exp(v) - p3*v"],
+    {"p1": 0.05, "p2": 14.0, "p3": 2.0},
+)
+LORENZ84 = udd.Model(
+    ["x", "y", "z"],
+    ["-y^2 - z^2 - a*x + a*F", "x*y - b*x*z - y + G", "b*x*y + x*z - z"],
+    {"a": 0.25, "b": 4.0, "G": 1.6, "F": 2.0},
+)
+
+
+def _positive(model: udd.Model) -> udd.Equilibrium:
+    return next(rest for rest in udd.equilibria(model) if (rest.state > 1e-6).all())
+
+
+def _of(curve: udd.Locus, kind: str) -> list[udd.LocusPoint]:
+    return sorted((point for point in curve.points if point.kind == kind), key=lambda point: point.values[1])
+
+
+@pytest.fixture(scope="module")
+def oxidation() -> udd.Branch:
+    """The equilibria of the oxidation of CO on platinum."""
+    return udd.continuation(_positive(CO), "q2", (0.5, 2.0))
+
+
+def test_folds_go_on_through_their_cusp(oxidation: udd.Branch) -> None:
+    assert sorted(p.value for p in oxidation.find("fold")) == pytest.approx([1.0420485, 1.0522003], abs=1e-7)
+    first, last = (udd.locus(fold, "k", (0.01, 2.0), within=(0.3, 3.0)) for fold in oxidation.find("fold"))
+    for curve in (first, last):
+        (cusp,) = _of(curve, "cusp")
+        assert cusp.values[1] == pytest.approx(0.35599, abs=5e-6)
+        assert (cusp.errors < 1e-11).all() and cusp.coefficient_errors["c"] < 1e-6 * abs(
+            cusp.coefficients["c"]
+        )
+        assert curve.ends == ("the bound 2", "the bound 2") and len(_of(curve, "Bogdanov-Takens")) == 2
+    # Either fold leads to the same points.
+    for a, b in zip(_of(first, "Bogdanov-Takens"), _of(last, "Bogdanov-Takens"), strict=True):
+        assert (np.abs(a.values - b.values) <= a.errors + b.errors).all()
+        assert a.coefficients == pytest.approx(b.coefficients, rel=1e-6)
+
+
+def test_curves_of_hopf_points_end_at_bogdanov_takens_points(oxidation: udd.Branch) -> None:
+    folds = udd.locus(oxidation.find("fold")[0], "k", (0.01, 2.0), within=(0.3, 3.0))
+    curve = udd.locus(oxidation.find("Hopf")[0], "k", (0.01, 2.0), within=(0.3, 3.0))
+    assert curve.ends == ("a Bogdanov-Takens point",) * 2
+    ends = _of(curve, "Bogdanov-Takens")
+    for own, other in zip(ends, _of(folds, "Bogdanov-Takens"), strict=True):
+        assert (np.abs(own.values - other.values) <= own.errors + other.errors).all()
+        assert isinstance(own.solution, udd.Equilibrium)
+        assert np.sort(np.abs(own.solution.eigenvalues))[:2] == pytest.approx([0.0, 0.0], abs=1e-6)
+    # Between two zeros of the first Lyapunov coefficient cycles are born unstable.
+    assert [np.sign(point.coefficients["l2"]) for point in _of(curve, "Bautin")] == [-1.0, -1.0]
+    inside = (curve.values[:, 1] - ends[0].values[1]) * (curve.values[:, 1] - ends[1].values[1]) < 0.0
+    assert len(curve) > 10 and not inside[0]
+
+
+def test_bazykins_cusps_are_triple_roots() -> None:
+    branch = udd.continuation(_positive(BAZYKIN), "al", (0.0, 2.0))
+    curve = udd.locus(branch.find("fold")[0], "d", (0.0, 3.0), within=(0.0, 2.0))
+    assert curve.ends == ("the branch is closed",) * 2
+    cusps = _of(curve, "cusp")
+    found = [tuple(point.values.round(5)) for point in cusps]
+    assert found == [(0.90123, 0.00357), (0.08877, 2.80236)]
+    for cusp in cusps:
+        al, d = cusp.values
+        # With y from the first equation the second one is a cubic of x.
+        pole = np.polynomial.Polynomial([1.0, al])
+        cubic = np.polynomial.Polynomial([0, 1]) - pole - d * np.polynomial.Polynomial([1, -0.01]) * pole**2
+        (x,) = cubic.deriv(2).roots()
+        size = np.abs(cubic.coef) @ x ** np.arange(4)
+        assert abs(cubic(x)) < 1e-12 * size and abs(cubic.deriv()(x)) * x < 1e-12 * size
+    hopf = udd.locus(branch.find("Hopf")[0], "d", (0.0, 3.0), within=(0.0, 2.0))
+    everything = np.vstack([hopf.values, *(point.values for point in (*hopf.points, *curve.points))])
+    assert (everything >= -1e-12).all() and hopf.ends[1] == "a Bogdanov-Takens point"
+
+
+def test_the_cusp_of_an_exothermic_reaction() -> None:
+    branch = udd.continuation(udd.equilibria(REACTION, near=[0.1, 0.3])[0], "p1", (0.0, 1.0))
+    known = {"fold": [0.0889318, 0.105739], "Hopf": [0.1309]}
+    for kind, values in known.items():
+        assert sorted(point.value for point in branch.find(kind)) == pytest.approx(values, abs=1e-5)
+    curve = udd.locus(branch.find("fold")[0], "p3", (1.0, 4.0), within=(0.0, 1.0))
+    (cusp,) = _of(curve, "cusp")
+    # p2 = 4 (1 + p3) there, with v = 2 and u = 1/2.
+    assert (np.abs(cusp.values - [np.exp(-2.0), 2.5]) <= cusp.errors).all() and (cusp.errors < 1e-12).all()
+
+
+def test_a_zero_hopf_point_of_lorenz_84() -> None:
+    branch = udd.continuation(udd.equilibria(LORENZ84)[0], "G", (0.0, 3.0))
+    fold, hopf = (
+        udd.locus(branch.find(kind)[0], "F", (0.0, 3.0), within=(0.0, 3.0)) for kind in ("fold", "Hopf")
+    )
+    (one,), (other,) = _of(fold, "zero-Hopf"), _of(hopf, "zero-Hopf")
+    # A. Shil'nikov, G. Nicolis and C. Nicolis, Int. J. Bif. Chaos 5 (1995) 1701.
+    assert one.values == pytest.approx([1.682969, 1.684052], abs=1e-6)
+    assert (np.abs(one.values - other.values) <= one.errors + other.errors).all()
+    assert one.coefficients["s"] == other.coefficients["s"] == 1.0
+    assert one.coefficients["theta"] == pytest.approx(other.coefficients["theta"], abs=1e-9)
+    assert "zero-Hopf at G = 1.68296855" in repr(one) and "zero-Hopf" in repr(hopf)
+
+
+def test_the_second_lyapunov_coefficient_is_that_of_the_normal_form() -> None:
+    # z' = (mu + 2 i) z + a z |z|^2 + 0.7 z |z|^4 with x + i y = z, seen in bent coordinates.
+    x, y = "(u - 0.3*v^2)", "v"
+    square = f"({x}^2 + v^2)"
+    radial = f"(mu + a*{square} + 0.7*{square}^2)"
+    fx, fy = f"({x}*{radial} - {y}*(2 - 0.5*{square}))", f"({y}*{radial} + {x}*(2 - 0.5*{square}))"
+    model = udd.Model(["u", "v"], [f"{fx} + 0.6*v*{fy}", fy], {"mu": -0.1, "a": -0.4})
+    (hopf,) = udd.continuation(udd.equilibria(model, near=[0.0, 0.0])[-1], "mu", (-0.5, 0.5)).find("Hopf")
+    curve = udd.locus(hopf, "a", (-1.0, 1.0), within=(-0.5, 0.5))
+    (bautin,) = _of(curve, "Bautin")
+    assert (np.abs(bautin.values) <= bautin.errors + 1e-12).all()
+    # The eigenvector has length 1, so that |z|^2 is twice its coefficient's; and over the frequency.
+    assert bautin.coefficients["l2"] == pytest.approx(4 * 0.7 / 2.0, rel=1e-7)
