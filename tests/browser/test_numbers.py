@@ -114,7 +114,8 @@ def test_an_effect_and_a_start_are_read_with_a_comma_or_marked(opened: Opened) -
 def test_the_numbers_of_a_film_are_marked_before_it_is_sent(opened: Opened, tmp_path: Path) -> None:
     page = opened.go()
     page.click("#to-film")
-    page.set_input_files("#file", {"name": "a.csv", "mimeType": "", "buffer": b"a,b\n1,2\n"})
+    page.set_input_files("#file", {"name": "a.csv", "mimeType": "", "buffer": b"t,Y,Z,beta\n1,2,3,4\n"})
+    until(page, "!document.getElementById('columns').hidden")
     page.fill("#loop-W", "4,2 cm/s")
     page.click("#go")
     assert "is not a number" in marked(page)[0]

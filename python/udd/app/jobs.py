@@ -183,7 +183,8 @@ def _take(job: Job, message: dict[str, Any]) -> None:
     elif "done" in message:
         job.state, job.answer = "done", message["done"]
     elif "error" in message:
-        job.state, job.answer = "failed", {"error": str(message["error"])}
+        parts = message.get("parts", [])
+        job.state, job.answer = "failed", {"error": str(message["error"]), "parts": parts}
 
 
 def _kill(job: Job) -> None:
@@ -195,8 +196,8 @@ def _kill(job: Job) -> None:
 
 
 def _empty(job: Job) -> None:
-    """Delete what was uploaded, and what a job that failed has left."""
-    if job.state == "done":
+    """Delete what was uploaded, and the folder of a job that has made nothing."""
+    if job.state == "done" or (job.state == "failed" and job.answer.get("parts")):
         (job.folder / job.asked.get("file", "none")).unlink(missing_ok=True)
     else:
         shutil.rmtree(job.folder, ignore_errors=True)

@@ -25,7 +25,7 @@ from udd._util.tables import parsed
 from udd.errors import UddError
 from udd.models import Disk
 
-from . import limits, uploads
+from . import limits, table_columns, uploads
 from .calculators import Calculators
 from .error_text import sentence
 from .folders import workspace
@@ -83,6 +83,18 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False, prepare
             raise
         return JSONResponse({"job": jobs.submit(asked, folder).id})
 
+    async def columns(request: Request) -> Response:
+        folder = uploads.private_folder(state["folder"])
+        try:
+            file = await uploads.receive(request.stream(), folder)
+            if file.suffix == ".film":
+                raise UddError("This is no table.")
+            return JSONResponse(await _while_there(request, state["maps"].ask(table_columns.look, file)))
+        except UddError as error:
+            raise type(error)(str(error).replace(str(folder), "").replace("/upload.csv: ", "")) from None
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
     async def result(request: Request) -> Response:
         job = jobs.jobs.get(request.path_params["job"])
         file = job.file(request.path_params["name"]) if job is not None else None
@@ -100,6 +112,7 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False, prepare
         Route("/", page),
         Route("/api/catalogue", about),
         Route("/api/run.csv", table),
+        Route("/api/table", columns, methods=["POST"]),
         Route("/api/jobs/{kind}", new_job, methods=["POST"]),
         Route("/api/jobs/{job}/{name}", result),
         WebSocketRoute("/api/socket", socket),
@@ -144,7 +157,9 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
         if declared.isdigit() and int(declared) > limits.UPLOAD:
             raise uploads.TooLarge(f"The file is larger than {limits.UPLOAD >> 20} MB.")
         file = await uploads.receive(request.stream(), folder)
-        return {"kind": "loop", "file": file.name, "film": file.suffix == ".film", **known}
+        chosen = parsed("the columns", request.query_params.get("columns") or "[]")
+        film = file.suffix == ".film"
+        return {"kind": "loop", "file": file.name, "film": film, "columns": chosen, **known}
     if kind == "sample":
         from udd.demo import pipeline
 

@@ -30,6 +30,8 @@ _PICTURES_EVERY = 0.2  # s between the frames that are shown
 _CUT = 0.01  # share of the promised frames that may be missing
 _PICTURE = 480  # pixels, the longer side of what is shown
 
+_NO_DRIVE = "the drive speed W is not in the file's header: say it in cm/s (0 where the wheels stand)"
+
 Tell = Callable[[dict[str, Any]], None]
 
 
@@ -54,9 +56,15 @@ def main() -> None:
         done["warnings"] = [_sentence(message, asked.get("file", "")) for message in told]
         tell({"done": done})
     except UddError as error:
-        tell({"error": _sentence(error, asked.get("file", ""))})
+        tell({"error": _sentence(error, asked.get("file", "")), "parts": _kept()})
     except MemoryError:
         tell({"error": "This takes more memory than a job may have."})
+
+
+def _kept() -> list[dict[str, str]]:
+    """What a job that failed leaves: the motion that it had measured by then."""
+    table = OUT / "measurement.csv"
+    return [{"name": table.name, "title": "The measured motion"}] if table.is_file() else []
 
 
 def _sentence(error: object, file: str) -> str:
@@ -70,28 +78,28 @@ def _sentence(error: object, file: str) -> str:
 def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """From a film or a table to the verdict."""
     from udd.discovery import discover
-    from udd.measurement import read_measurement
-    from udd.models import Disk, Pendulum
+    from udd.models import Disk, Model, Pendulum
+
+    from .table_columns import measurement_of
 
     file, known = Path(asked["file"]), {k: asked[k] for k in ("W", "R") if asked.get(k) is not None}
     film = asked["film"]
     tell({"say": "reading the film" if film else "reading the table"})
     if film:
-        measurement = _tracked(file, known.get("R", 0.08), tell).with_meta(**known)
+        measurement = _tracked(file, known, tell).with_meta(**known)
     else:
-        measurement = read_measurement(file, **known)
+        measurement = measurement_of(file, asked.get("columns") or [], known)
     measurement.to_csv(OUT / "measurement.csv")
-    if measurement.kind == "pendulum":
+    if measurement.kind == "pendulum" or measurement.names == ("Omega",):
         length = asked.get("length") or measurement.meta.get("length")
         if not length:
-            raise UddError("this is a pendulum's record: say its length in metres")
-        model: Disk | Pendulum = Pendulum(float(length))
+            raise UddError("this is a pendulum's record: say its length in cm")
+        pendulum = Pendulum(float(length))
+        model: Model = pendulum if measurement.kind == "pendulum" else pendulum.with_gyroscope()
     else:
         W, R = measurement.meta.get("W"), measurement.meta.get("R", 0.08)
         if W is None:
-            raise UddError(
-                "the drive speed W is not in the file's header: say it in cm/s (0 where the wheels stand)"
-            )
+            raise UddError(_NO_DRIVE)
         model = Disk(float(W), R=float(R))
     found = discover(measurement, model, progress=lambda text: tell({"say": text}))
     tell({"say": "drawing the report"})
@@ -102,7 +110,7 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     return {**result.of(found), "parts": report_parts.save_parts(report, OUT)}
 
 
-def _tracked(file: Path, radius: float, tell: Tell) -> Any:
+def _tracked(file: Path, known: dict[str, float], tell: Tell) -> Any:
     """The motion in a film, shown while it is tracked."""
     import cv2
 
@@ -116,6 +124,8 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
     missing = film.promised - film.packets
     if missing > _CUT * film.promised:
         raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
+    if "W" not in known:
+        raise UddError(_NO_DRIVE)
     tell({"say": "looking over the film"})
     last = 0.0
 
@@ -139,7 +149,7 @@ def _tracked(file: Path, radius: float, tell: Tell) -> Any:
             frame["centre"] = [factor * c for c in seen.centre]
         tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
 
-    return track_disk(file, disk_radius=radius, watch=watch).measurement
+    return track_disk(file, disk_radius=known.get("R", 0.08), watch=watch).measurement
 
 
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:

@@ -133,6 +133,11 @@ def read_measurement(
     return m
 
 
+def tables_of(path: str | os.PathLike[str], *, limit: float = LARGEST) -> list[Table]:
+    """The tables that a file holds, before anything is made of their columns."""
+    return _load(Path(path), None, limit)
+
+
 def headings_of(
     path: str | os.PathLike[str], columns: Columns | None = None, *, limit: float = LARGEST
 ) -> list[Heading]:

@@ -1,9 +1,11 @@
 // The loop: a film or a table goes in, the verdict comes out.
+import { Columns } from "./columns.js";
 import { address, request } from "./link.js";
 import { NumberField } from "./numbers.js";
 import { t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
+const FILMS = /\.(mp4|mov|m4v|avi|mkv|webm|mpg|mpeg|wmv|mts|m2ts|ts|3gp|ogv|flv|h264|dv)$/i;
 const MARKS = ["#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b"];
 
 export class Loop {
@@ -11,10 +13,13 @@ export class Loop {
     this.link = link;
     this.page = page;
     this.job = null;
-    this.known = [["W", 100], ["R", 100], ["length", 1]].map(([name, scale]) => {
-      const about = { name: t(`loop_${name}`), least: 0, most: null, optional: true };
-      return [name, scale, new NumberField($(`loop-${name}`), about)];
-    });
+    this.fields = Object.fromEntries(["W", "R", "length", "wheel", "rpm"].map((name) => {
+      const key = { wheel: "loop_wheel_R", rpm: "loop_rpm" }[name] ?? `loop_${name}`;
+      return [name, new NumberField($(`loop-${name}`), { name: t(key), least: 0, most: null, optional: true }, () => this.tell())];
+    }));
+    for (const name of ["W", "R", "length"]) $(`loop-${name}`).addEventListener("input", () => this.tell());
+    for (const name of ["wheel", "rpm"]) $(`loop-${name}`).addEventListener("input", () => this.fromWheel());
+    this.columns = new Columns(() => this.tell());
     $("file").addEventListener("change", () => this.choose($("file").files[0]));
     $("go").addEventListener("click", () => this.send());
     $("sample").addEventListener("click", () => this.begin("sample"));
@@ -38,6 +43,7 @@ export class Loop {
     link.on("frame", ({ numbers: [length], body }) => this.frame(length, body));
     link.on("open", () => this.job && link.say({ type: "watch", job: this.job }));
     this.show("ask");
+    this.tell();
   }
 
   show(name) {
@@ -45,25 +51,87 @@ export class Loop {
     if (name !== "found") $("report").removeAttribute("src");
   }
 
-  choose(file) {
+  async choose(file) {
     this.file = file ?? null;
-    $("failed").textContent = "";
-    $("go").disabled = !file;
+    this.table = null;
+    this.fail("");
+    this.columns.hide();
     $("chosen").textContent = file ? t("loop_chosen", { name: file.name, size: (file.size / 2 ** 20).toFixed(1) }) : "";
+    if (file && this.tooLarge) this.fail(t("loop_too_large", { size: this.page.catalogue.limits.upload >> 20 }));
+    this.tell();
+    if (!file || this.isFilm || this.tooLarge) return;
+    this.reading = true;
+    this.tell();
+    try {
+      const answer = await request("/api/table", {}, { method: "POST", body: file });
+      const found = await answer.json();
+      if (file !== this.file) return;
+      this.table = found;
+      this.columns.show(found);
+    } catch (error) {
+      if (file === this.file) this.fail(error.message);
+    }
+    this.reading = false;
+    this.tell();
+  }
+
+  get isFilm() {
+    return this.file?.type.startsWith("video/") || FILMS.test(this.file?.name ?? "");
+  }
+
+  get tooLarge() {
+    return this.file && this.file.size > this.page.catalogue.limits.upload;
+  }
+
+  /** The drive speed by the wheel's radius and its turns per minute. */
+  fromWheel() {
+    const { wheel, rpm } = this.fields;
+    if (!wheel.wrong && !rpm.wrong && this.said("wheel") && this.said("rpm")) {
+      this.fields.W.show(String(+((2 * Math.PI * wheel.value * rpm.value) / 60).toPrecision(4)));
+    }
+    this.tell();
+  }
+
+  /** Why the file cannot be sent yet; "" if it can. */
+  get why() {
+    if (!this.file) return t("why_file");
+    if (this.tooLarge) return t("why_large");
+    if (Object.values(this.fields).some((field) => field.wrong)) return t("why_number");
+    if (this.isFilm) return this.said("W") ? "" : t("why_W");
+    if (this.reading) return t("why_reading");
+    if (!this.table) return "";
+    const kind = this.columns.kind;
+    if (!kind) return t("why_columns");
+    if (kind === "disk") return this.said("W") || this.table.meta.W !== null ? "" : t("why_W");
+    return this.said("length") || this.table.meta.length !== null ? "" : t("why_length");
+  }
+
+  said(name) {
+    return this.fields[name].input.value.trim() !== "";
+  }
+
+  /** Say beside the button what is missing. */
+  tell() {
+    const { why } = this;
+    $("why").textContent = why;
+    $("go").classList.toggle("waiting", why !== "");
   }
 
   async send() {
-    const most = this.page.catalogue.limits.upload;
-    if (this.file.size > most) return this.fail(t("loop_too_large", { size: most >> 20 }));
-    const known = this.known.map(([name, scale, field]) => [name, scale, field.value]);
-    if (known.some(([, , value]) => value === undefined)) return;
-    const given = known.filter(([, , value]) => value !== null);
-    const values = given.map(([name, scale, value]) => [name, String(+(value / scale).toPrecision(12))]);
-    await this.begin("film", Object.fromEntries(values), this.file);
+    const values = {};
+    for (const name of ["W", "R", "length"]) {
+      const { value } = this.fields[name];
+      if (value === undefined) return this.tell();
+      if (value !== null) values[name] = String(+(value / 100).toPrecision(12));
+    }
+    if (this.why) return this.fail(this.tooLarge ? t("loop_too_large", { size: this.page.catalogue.limits.upload >> 20 }) : this.why);
+    const chosen = this.isFilm || !this.table ? [] : this.columns.chosen;
+    if (chosen.length) values.columns = JSON.stringify(chosen);
+    await this.begin("film", values, this.file);
   }
 
   async begin(kind, values = {}, body = undefined) {
-    $("failed").textContent = "";
+    this.fail("");
     this.stages([t(body ? "loop_uploading" : "loop_waiting")]);
     const canvas = $("frames");
     canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
@@ -85,9 +153,19 @@ export class Loop {
     else this.show("ask");
   }
 
-  fail(text) {
+  fail(text, parts = []) {
     this.show("ask");
     $("failed").textContent = text;
+    $("kept").hidden = !parts.length;
+    $("kept").replaceChildren(...(parts.length ? [t("loop_kept"), ...parts.map((part) => this.linkTo(part))] : []));
+  }
+
+  linkTo({ name, title }) {
+    const a = document.createElement("a");
+    a.href = this.part(name, { download: "1" });
+    a.download = `udd-${name}`;
+    a.textContent = title;
+    return a;
   }
 
   stages(list) {
@@ -105,7 +183,7 @@ export class Loop {
     else this.stages(stages);
     if (stages.length && !stages.at(-1).includes("film")) $("progress").removeAttribute("value");
     if (state === "cancelled") this.fail(t("loop_cancelled"));
-    if (state === "failed") this.fail(answer.error);
+    if (state === "failed") this.fail(answer.error, answer.parts);
     if (state === "done") this.done(answer);
   }
 
@@ -192,11 +270,7 @@ export class Loop {
     $("evidence").replaceChildren(table(t("loop_evidence"), [t("loop_candidate"), t("loop_chi2")], evidence));
     $("files").replaceChildren(...found.parts.map(({ name, title }) => {
       const item = document.createElement("li");
-      const a = document.createElement("a");
-      a.href = this.part(name, { download: "1" });
-      a.download = `udd-${name}`;
-      a.textContent = title;
-      item.append(a);
+      item.append(this.linkTo({ name, title }));
       return item;
     }));
     $("report").src = this.part("report.html");

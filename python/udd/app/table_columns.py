@@ -1,0 +1,134 @@
+"""A table that a visitor drops: its columns to choose from, and the measurement that the choice makes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from udd.errors import MeasurementError, UddError
+from udd.measurement import Measurement, read_measurement
+from udd.measurement.formats.headings import COUNTED, UNITS
+from udd.measurement.formats.table import Table
+from udd.measurement.guesses import ROLES, guessed
+from udd.measurement.gyroscope import holds_rates_alone, read_gyroscope
+from udd.measurement.read import tables_of
+
+_ROWS = 6  # that are shown
+_COLUMNS = 40
+_KNOWN = ("W", "R", "length")  # what a header may say
+
+
+def look(path: Path) -> dict[str, Any]:
+    """Return the columns of a table with its first rows, a guess of each, and what its header says."""
+    tables = tables_of(path)
+    table = max(tables, key=len)
+    roles = guessed(table)
+    chosen = [k for k, heading in enumerate(table.headings) if heading.name not in ("", "_")][:_COLUMNS]
+    return {
+        "columns": [
+            {
+                "heading": table.headings[k].raw[:60],
+                "unit": table.headings[k].unit or _usual_unit(table, k, roles[k]),
+                "guess": roles[k],
+                "cells": _cells(table, k),
+            }
+            for k in chosen
+        ],
+        "rows": len(table),
+        "meta": {name: _number(table.meta.get(name)) for name in _KNOWN},
+        "kind": _kind(path),
+        "units": {role: list(UNITS[_base(role)]) for role in ROLES},
+    }
+
+
+def _usual_unit(table: Table, k: int, role: str) -> str:
+    """Degrees for angles beyond a turn of a pendulum whose heading states no unit."""
+    if role != "theta":
+        return ""
+    try:
+        values = table.numbers(k)
+    except UddError:
+        return ""
+    return "deg" if np.nanmax(np.abs(values), initial=0.0) > np.pi else ""
+
+
+def _kind(path: Path) -> str:
+    """What the table is without a word: "disk", "pendulum", "gyroscope", or nothing."""
+    try:
+        return read_measurement(path).kind
+    except UddError:
+        pass
+    try:
+        return "gyroscope" if holds_rates_alone(path) and len(read_gyroscope(path)) else ""
+    except UddError:
+        return ""
+
+
+def _cells(table: Table, k: int) -> list[str]:
+    column = table.columns[k]
+    try:
+        return [f"{value:.6g}" for value in table.numbers(k)[:_ROWS].tolist()]
+    except (UddError, ValueError):
+        return [str(cell or "")[:20] for cell in list(column)[:_ROWS]]
+
+
+def _number(value: Any) -> float | None:
+    try:
+        made = float(value)
+    except (TypeError, ValueError):
+        return None
+    return made if np.isfinite(made) else None
+
+
+def _base(role: str) -> str:
+    return COUNTED.get(role, "rad/s")
+
+
+def measurement_of(path: Path, choices: Sequence[Any], known: dict[str, float]) -> Measurement:
+    """Read a table with the columns that were chosen, ``[role, heading, unit]`` each; none: as it stands.
+
+    Raises
+    ------
+    UddError
+        The choice makes no motion of a disk or a pendulum, or the table cannot be read.
+    """
+    if not choices:
+        try:
+            return read_measurement(path, **known)
+        except UddError:
+            if not holds_rates_alone(path):
+                raise
+            return read_gyroscope(path, **known)
+    columns: dict[str, str] = {}
+    units: dict[str, str] = {}
+    for choice in choices:
+        if not isinstance(choice, list) or [type(part) for part in choice] != [str] * 3:
+            raise UddError("the choice of columns cannot be read")
+        role, heading, unit = choice
+        if role not in ROLES:
+            raise UddError(f"no column is a {role:.20}")
+        if role in columns:
+            raise UddError(f"two columns are chosen as {role}")
+        columns[role], units[role] = heading, unit
+    made = set(columns) - {"t"}
+    if made not in ({"theta"}, {"Omega"}, {"Y", "Z", "beta"}):
+        raise UddError("choose t with theta, t with Omega, or t with Y, Z and beta")
+    found = read_measurement(path, columns, **known)
+    stated = {h.raw: h.unit for table in tables_of(path) for h in table.headings}
+    factors = {role: _factor(role, units[role], stated.get(columns[role], "")) for role in columns}
+    values = found.values * [factors[name] for name in found.names]
+    return replace(found, t=found.t * factors.get("t", 1.0), values=values)
+
+
+def _factor(role: str, unit: str, stated: str) -> float:
+    """By what values are multiplied that were read by the unit that the heading states."""
+    known = UNITS[_base(role)]
+    if not unit or unit == stated:
+        return 1.0
+    if unit not in known:
+        raise MeasurementError(f"{unit} is no unit of {role}")
+    return known[unit] / known.get(stated, 1.0)

@@ -1,0 +1,63 @@
+"""Which column is what, guessed from headings in English, German and Dutch."""
+
+from __future__ import annotations
+
+import unicodedata
+
+import numpy as np
+
+from .formats import Table
+from .formats.headings import UNITS, Heading
+
+#: What a column of a disk or a pendulum may be.
+ROLES = ("t", "theta", "Omega", "Y", "Z", "beta")
+#: Words of headings; the first role with a word in a heading has it, so longer words stand first.
+_WORDS: dict[str, tuple[str, ...]] = {
+    "t": ("time", "zeit", "tijd", "sekunden", "seconds", "seconden"),
+    "Omega": ("angular velocity", "angular speed", "winkelgeschwindigkeit", "hoeksnelheid", "gyro", "omega"),
+    "beta": ("orientation", "orientierung", "ausrichtung", "orientatie", "drehwinkel", "draaihoek", "beta"),
+    "theta": ("angle", "winkel", "hoek", "auslenkung", "uitwijking", "theta"),
+    "Z": ("height", "vertical", "hohe", "hoehe", "vertikal", "hoogte", "verticaal"),
+    "Y": ("horizontal", "waagerecht", "horizontaal", "sideways"),
+}
+_LETTERS = {"t": "t", "y": "Y", "z": "Z"}
+
+
+def guessed(table: Table) -> list[str]:
+    """Return the role of each column of a table, empty where there is none; each role once."""
+    roles = [_role(heading) for heading in table.headings]
+    rates = [k for k, role in enumerate(roles) if role == "Omega"]
+    if len(rates) > 1:
+        best = max(rates, key=lambda k: _liveliness(table, k))
+        roles = [role if role != "Omega" or k == best else "" for k, role in enumerate(roles)]
+    taken: set[str] = set()
+    for k, role in enumerate(roles):
+        roles[k] = "" if role in taken else role
+        taken.add(role)
+    if "theta" in taken or not taken & {"Y", "Z", "beta"}:
+        # A pendulum's table: what else has an axis' letter is passed over.
+        roles = ["" if role in ("Y", "Z", "beta") else role for role in roles]
+    return ["" if role == "Omega" and taken & {"theta", "Y", "Z"} else role for role in roles]
+
+
+def _role(heading: Heading) -> str:
+    if heading.name in ROLES:
+        return heading.name
+    if heading.unit in UNITS["rad/s"]:
+        return "Omega"
+    plain = unicodedata.normalize("NFKD", heading.raw.casefold())
+    words = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    for role, known in _WORDS.items():
+        if any(word in words for word in known):
+            return role
+    return _LETTERS.get((heading.plain or heading.name).casefold().strip(), "")
+
+
+def _liveliness(table: Table, k: int) -> float:
+    """How much a rate of turning varies; nothing if it has one sign, as a magnitude does."""
+    try:
+        values = table.numbers(k)
+    except ValueError:
+        return 0.0
+    there = values[np.isfinite(values)]
+    return float(np.std(there)) if there.size and there.min() < 0.0 < there.max() else 0.0

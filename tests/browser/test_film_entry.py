@@ -1,0 +1,60 @@
+"""What is asked before a file is sent: the drive speed, and what the columns of a table are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import udd
+from browser_for_tests import Opened, until
+
+SAMPLE = Path(udd.__file__).parent / "demo" / "sample.mp4"
+
+
+def why(opened: Opened) -> str:
+    return str(opened.page.locator("#why").text_content())
+
+
+def test_the_drive_is_asked_for_before_a_film_is_sent(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#to-film")
+    assert why(opened) == "Choose a file first."
+    page.set_input_files("#file", SAMPLE)
+    assert why(opened).startswith("Say the drive speed W first")
+    page.click("#go")
+    assert page.locator("#failed").text_content().startswith("Say the drive speed W first")
+    assert page.locator("#work").is_hidden()
+    page.click("#wheel-box summary")
+    page.fill("#loop-wheel", "3")
+    page.fill("#loop-rpm", "13,37")
+    assert page.input_value("#loop-W") == "4.2"
+    assert why(opened) == ""
+
+
+def test_columns_are_guessed_and_chosen(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#to-film")
+    rows = "".join(f"{k / 50:.2f};{20 * (-1) ** k};{k}\n".replace(".", ",") for k in range(60))
+    table = ("Tijd;Uitwijking;Aantal\n" + rows).encode()
+    page.set_input_files("#file", {"name": "slinger.csv", "mimeType": "text/csv", "buffer": table})
+    until(page, "!document.getElementById('columns').hidden")
+    chosen = page.eval_on_selector_all("#column-table select:not([hidden])", "all => all.map(s => s.value)")
+    assert chosen == ["t", "theta", "", "s", "deg"]
+    assert why(opened).startswith("Say the length of the pendulum first")
+    page.fill("#loop-length", "65")
+    assert why(opened) == ""
+    page.select_option("#column-table tr >> nth=1 >> select >> nth=1", "")
+    assert why(opened).startswith("Say which columns are")
+
+
+def test_a_phone_needs_a_length_alone(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#to-film")
+    page.set_input_files("#file", udd.examples.path("phone.csv"))
+    until(page, "!document.getElementById('columns').hidden")
+    assert page.eval_on_selector_all("#column-table select", "all => all.map(s => s.value)")[:4] == [
+        "t",
+        "Omega",
+        "",
+        "",
+    ]
+    assert why(opened).startswith("Say the length")
