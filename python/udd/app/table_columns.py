@@ -69,11 +69,15 @@ def _kind(path: Path) -> str:
 
 
 def _cells(table: Table, k: int) -> list[str]:
-    column = table.columns[k]
+    """The first cells of a column, as numbers or else as text."""
     try:
         return [f"{value:.6g}" for value in table.numbers(k)[:_ROWS].tolist()]
-    except (UddError, ValueError):
-        return [str(cell or "")[:20] for cell in list(column)[:_ROWS]]
+    except UddError:
+        pass
+    try:
+        return [str(cell)[:20] for cell in table.words(k)[:_ROWS]]
+    except UddError:
+        return ["..."] * min(_ROWS, len(table))
 
 
 def _number(value: Any) -> float | None:
@@ -88,7 +92,7 @@ def _base(role: str) -> str:
     return COUNTED.get(role, "rad/s")
 
 
-def measurement_of(path: Path, choices: Sequence[Any], known: dict[str, float]) -> Measurement:
+def measurement_of(path: Path, choices: Sequence[Any], known: dict[str, Any]) -> Measurement:
     """Read a table with the columns that were chosen, ``[role, heading, unit]`` each; none: as it stands.
 
     Raises

@@ -56,13 +56,15 @@ def main() -> None:
         done["warnings"] = [_sentence(message, asked.get("file", "")) for message in told]
         tell({"done": done})
     except UddError as error:
-        tell({"error": _sentence(error, asked.get("file", "")), "parts": _kept()})
+        tell(
+            {"error": _sentence(error, asked.get("file", "")), "parts": _kept() if asked.get("film") else []}
+        )
     except MemoryError:
         tell({"error": "This takes more memory than a job may have."})
 
 
 def _kept() -> list[dict[str, str]]:
-    """What a job that failed leaves: the motion that it had measured by then."""
+    """List what a job leaves that failed after its film was tracked: the measured motion."""
     table = OUT / "measurement.csv"
     return [{"name": table.name, "title": "The measured motion"}] if table.is_file() else []
 
@@ -86,7 +88,7 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     film = asked["film"]
     tell({"say": "reading the film" if film else "reading the table"})
     if film:
-        measurement = _tracked(file, known, tell).with_meta(**known)
+        measurement = _tracked(file, known.get("R", 0.08), tell, "W" in known).with_meta(**known)
     else:
         measurement = measurement_of(file, asked.get("columns") or [], known)
     measurement.to_csv(OUT / "measurement.csv")
@@ -110,7 +112,7 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     return {**result.of(found), "parts": report_parts.save_parts(report, OUT)}
 
 
-def _tracked(file: Path, known: dict[str, float], tell: Tell) -> Any:
+def _tracked(file: Path, radius: float, tell: Tell, drive: bool = True) -> Any:
     """The motion in a film, shown while it is tracked."""
     import cv2
 
@@ -124,7 +126,7 @@ def _tracked(file: Path, known: dict[str, float], tell: Tell) -> Any:
     missing = film.promised - film.packets
     if missing > _CUT * film.promised:
         raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
-    if "W" not in known:
+    if not drive:
         raise UddError(_NO_DRIVE)
     tell({"say": "looking over the film"})
     last = 0.0
@@ -149,7 +151,7 @@ def _tracked(file: Path, known: dict[str, float], tell: Tell) -> Any:
             frame["centre"] = [factor * c for c in seen.centre]
         tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
 
-    return track_disk(file, disk_radius=known.get("R", 0.08), watch=watch).measurement
+    return track_disk(file, disk_radius=radius, watch=watch).measurement
 
 
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
