@@ -22,7 +22,7 @@ from .spec import Start, drive_of
 Array = NDArray[np.float64]
 
 _TRANSIENT = 60  # crossings left out
-VALUES = (90, 300)  # of the drive: a first picture, then a better one
+VALUES = (45, 300)  # of the drive: a first picture within a second, then a better one
 _KEPT = 40  # points of every orbit in a diagram
 
 
@@ -99,7 +99,7 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
             name,
             values,
             n=_KEPT,
-            transient=2 * _TRANSIENT,
+            transient=2 * _TRANSIENT if len(values) > VALUES[0] else _TRANSIENT // 2,
             initial_states=starts,
             max_extension=6,
             threads=_worker_threads(),

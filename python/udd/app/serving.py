@@ -45,7 +45,7 @@ def serve(
             file=sys.stderr,
         )
     token = new_token()
-    shown = names[0] if not any_address else f"{_own_name()}:{port}"
+    shown = names[0] if not any_address else f"{network_address() or _own_name()}:{port}"
     link = f"http://{shown}/?token={token}"
     server = server_of(make_app(token, names, any_address=any_address, prepared=True))
     raise_file_limit()
@@ -60,11 +60,23 @@ def hosts_of(host: str, port: int) -> tuple[list[str], bool]:
     bracketed = f"[{host}]" if ":" in host else host
     any_address = host in ("0.0.0.0", "::")
     if any_address:
-        return [f"127.0.0.1:{port}", f"localhost:{port}", f"{_own_name()}:{port}"], True
+        names = ["127.0.0.1", "localhost", _own_name(), f"{_own_name().removesuffix('.local')}.local"]
+        return [f"{name}:{port}" for name in dict.fromkeys(names)], True
     names = [f"{bracketed}:{port}"]
     if _is_local(host):
         names += [f"localhost:{port}"]
     return names, False
+
+
+def network_address() -> str | None:
+    """Return the address by which others on the network reach this machine, if it has one."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # nothing is sent: the system only chooses an interface
+            found = str(probe.getsockname()[0])
+        except OSError:
+            return None
+    return None if ipaddress.ip_address(found).is_loopback else found
 
 
 def _own_name() -> str:

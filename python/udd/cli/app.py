@@ -54,7 +54,20 @@ def run(args: argparse.Namespace) -> CommandResult:
 
     def ready(link: str) -> None:
         print(link + (f"#{fragment}" if fragment else ""), flush=True)
+        if not args.host.startswith("127.") and args.host != "localhost":
+            _show_code(link)
         print("Ctrl-C ends it.", file=sys.stderr, flush=True)
 
     serve(args.host, args.port, fragment=fragment, browser=not args.no_browser, ready=ready)
     return CommandResult("", {})
+
+
+def _show_code(link: str) -> None:
+    """Print a code that phones read, if the package for it is there and a terminal shows it."""
+    if not sys.stderr.isatty():
+        return
+    try:
+        import segno
+    except ImportError:
+        return
+    segno.make(link).terminal(out=sys.stderr, compact=True)

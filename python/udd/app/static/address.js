@@ -2,6 +2,8 @@
 import { parse } from "./numbers.js";
 import { t } from "./texts.js";
 
+const FAR = 10; // times the end of its slider: further a number is changed
+
 /** The run that stands behind the # of the address; null where there is none. Throws what cannot be read. */
 export function read(hash, catalogue) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
@@ -10,8 +12,9 @@ export function read(hash, catalogue) {
   const about = catalogue.models[kind];
   if (!about) throw new Error(t("link_model", { text: kind }));
   const model = { kind };
+  const changed = [];
   for (const p of about.parameters) {
-    model[p.name] = given.has(p.name) ? number(p.name, given.get(p.name)) : p.default;
+    model[p.name] = given.has(p.name) ? within(p, number(p.name, given.get(p.name)), changed) : p.default;
   }
   if (kind === "disk") {
     model.edge = given.get("edge") === "ignore" ? "ignore" : "stop";
@@ -21,7 +24,17 @@ export function read(hash, catalogue) {
   if (parts.length !== about.states.length) throw new Error(t("link_state", { n: about.states.length, text: given.get("state") ?? "" }));
   const state = parts.map((part) => number("state", part));
   const speed = given.has("speed") ? number("speed", given.get("speed")) : 1;
-  return { model, state, twin: given.get("twin") === "1", tab: given.get("tab"), speed };
+  return { model, state, twin: given.get("twin") === "1", tab: given.get("tab"), speed, changed };
+}
+
+/** A number of a link; one far beyond its range, as a speed in other units is, is changed, and that is noted. */
+function within(about, value, changed) {
+  const most = FAR * about.most;
+  if (value <= most && value >= Math.min(0, about.least)) return value;
+  const kept = value > most ? about.most : about.least;
+  const text = (v) => `${+(v * about.scale).toPrecision(6)} ${about.unit}`.trim();
+  changed.push(t("link_changed", { name: about.name, from: text(value), to: text(kept) }));
+  return kept;
 }
 
 function number(name, text) {

@@ -1,14 +1,19 @@
 // The bifurcation diagram over the drive with the exponent under it; the drive's slider is its cursor.
-import { Axes, COLOURS, line, span } from "./plot.js";
+import { Axes, COLOURS, INK, line, span } from "./plot.js";
 import { t } from "./texts.js";
 
 const UNDECIDED = "#9a9a9a";
+const STEPS = 4; // diagrams and exponents, each in two passes
+const KEPT = 12;
 
 export class Diagram {
   constructor(link, page) {
     this.link = link;
     this.page = page;
-    this.generation = 0;
+    this.generation = this.steps = 0;
+    this.kept = new Map();
+    this.bar = document.getElementById("diagram-bar");
+    this.legend = document.getElementById("diagram-legend");
     this.axes = new Axes(document.getElementById("diagram"));
     this.below = new Axes(document.getElementById("exponent"));
     this.said = document.getElementById("diagram-said");
@@ -19,10 +24,15 @@ export class Diagram {
     link.on("exponents", ({ generation, numbers: [n], body }) => {
       if (generation !== this.generation) return;
       this.exponents = [0, 1, 2].map((k) => body.subarray(k * n, (k + 1) * n));
+      this.steps += 1;
       this.dirty = true;
     });
     link.on("diagram", (message) => {
-      if (message.generation === this.generation) this.working = false;
+      if (message.generation === this.generation) {
+        this.working = false;
+        this.kept.set(this.key, [this.found, this.exponents]);
+        if (this.kept.size > KEPT) this.kept.delete(this.kept.keys().next().value);
+      }
       this.tell();
     });
     link.on("open", () => (this.key = ""));
@@ -49,7 +59,13 @@ export class Diagram {
     if (key === this.key) return;
     this.key = key;
     this.generation += 1;
-    this.working = true;
+    this.steps = 0;
+    this.working = !this.kept.has(key);
+    if (!this.working) {
+      [this.found, this.exponents] = this.kept.get(key);
+      this.dirty = true;
+      return this.tell();
+    }
     const { model, state } = this.page.home;
     this.link.say({ type: "diagram", generation: this.generation, model, state, low, high });
     this.tell();
@@ -66,6 +82,7 @@ export class Diagram {
       period: at(values + n, n),
       rows: at(values + 2 * n, n * points * dim),
     };
+    this.steps += 1;
     this.dirty = true;
   }
 
@@ -140,6 +157,8 @@ export class Diagram {
   }
 
   tell() {
+    this.bar.hidden = !this.working;
+    this.bar.value = this.steps / STEPS;
     if (this.working) this.said.textContent = t("diagram_working");
     else if (this.found) {
       const now = this.page.home.model[this.drive.name];
@@ -201,6 +220,7 @@ export class Diagram {
           }
         }
       }
+      this.name(colours);
       if (j === 1 && Number.isFinite(edge)) {
         c.setLineDash([6, 5]);
         c.strokeStyle = "#9a9a9a";
@@ -213,6 +233,21 @@ export class Diagram {
         c.fillRect(this.from[0], 0, this.to[0] - this.from[0], this.axes.height);
       }
     });
+  }
+
+  /** Say which colour is which attractor. */
+  name(colours) {
+    const key = [...colours.keys()].join();
+    if (key === this.named) return;
+    this.named = key;
+    this.legend.replaceChildren(...[...colours.entries()].slice(0, 8).map(([label, colour], k) => {
+      const span = document.createElement("span");
+      const dot = document.createElement("span");
+      dot.textContent = "■ ";
+      dot.style.color = colour;
+      span.append(dot, t("attractor", { n: k + 1 }), " ");
+      return span;
+    }));
   }
 
   exponent(low, high, now) {
@@ -241,7 +276,7 @@ export class Diagram {
 
   cursor(axes, now) {
     const c = axes.context;
-    c.strokeStyle = "#000";
+    c.strokeStyle = INK;
     c.lineWidth = 1.5;
     line(c, axes.x(now), 0, axes.x(now), axes.height);
     c.lineWidth = 1;

@@ -4,7 +4,7 @@ import { fading } from "./trail.js";
 
 const MARKS = ["#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b"]; // clockwise from the one at beta: the device's own
 const PLACE = 65 / 80, SIDE = 16 / 80; // of the radius
-const REACH = 1.9; // radii shown to each side
+const [NEAR, FAR] = [1.3, 1.98]; // radii shown to each side: at least and at most
 
 export class DiskView extends Canvas {
   /** `moved` is told where the disk is dragged to, and whether it is let go. */
@@ -12,15 +12,23 @@ export class DiskView extends Canvas {
     super(element);
     this.moved = moved;
     this.held = null;
+    this.reach = FAR;
+    // A finger on the disk drags it; beside it, it scrolls the page.
+    element.addEventListener("touchstart", (e) => this.over(e.touches[0]) && e.preventDefault(), { passive: false });
     element.addEventListener("pointerdown", (e) => this.down(e));
     element.addEventListener("pointermove", (e) => this.move(e));
     element.addEventListener("pointerup", (e) => this.up(e));
     element.addEventListener("pointercancel", (e) => this.up(e));
   }
 
+  over(e) {
+    const [y, z] = this.place(e);
+    return Math.hypot(y - this.centre[0], z - this.centre[1]) <= this.radius;
+  }
+
   down(e) {
     const [y, z] = this.place(e);
-    if (Math.hypot(y - this.centre[0], z - this.centre[1]) > this.radius) return;
+    if (!this.over(e)) return;
     this.held = [this.centre[0] - y, this.centre[1] - z];
     this.element.setPointerCapture(e.pointerId);
     this.element.classList.add("dragging");
@@ -59,7 +67,8 @@ export class DiskView extends Canvas {
     const c = this.context;
     this.radius = radius;
     this.centre = disks[0].slice(0, 2);
-    this.unit = Math.min(this.width, this.height) / 2 / REACH / radius;
+    this.zoom(disks);
+    this.unit = Math.min(this.width, this.height) / 2 / this.reach / radius;
     this.clear();
     c.save();
     c.translate(this.width / 2, this.height / 2);
@@ -75,6 +84,17 @@ export class DiskView extends Canvas {
       c.fill();
     }
     c.restore();
+  }
+
+  /** Show as much as the disks have needed lately: more at once, less slowly. */
+  zoom(disks) {
+    let far = 0;
+    for (const [y, z, , trail] of disks) {
+      far = Math.max(far, Math.hypot(y, z));
+      trail?.each((o) => (far = Math.max(far, Math.hypot(trail.rows[o + 1], trail.rows[o + 2]))));
+    }
+    const want = this.held ? FAR : Math.min(FAR, Math.max(NEAR, 1.06 + far / this.radius));
+    this.reach = want > this.reach ? want : this.reach + 0.02 * (want - this.reach);
   }
 
   disk(c, y, z, beta, r, k) {

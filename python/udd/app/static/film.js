@@ -1,8 +1,10 @@
 // The loop: a film or a table goes in, the verdict comes out.
 import { Columns } from "./columns.js";
 import { address, request } from "./link.js";
+import { recalled, remember } from "./look.js";
 import { NumberField } from "./numbers.js";
-import { t } from "./texts.js";
+import { explain } from "./terms.js";
+import { list, t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
 const FILMS = /\.(mp4|mov|m4v|avi|mkv|webm|mpg|mpeg|wmv|mts|m2ts|ts|3gp|ogv|flv|h264|dv)$/i;
@@ -24,7 +26,10 @@ export class Loop {
     $("go").addEventListener("click", () => this.send());
     $("sample").addEventListener("click", () => this.begin("sample"));
     $("cancel").addEventListener("click", () => this.cancel());
-    $("another").addEventListener("click", () => this.show("ask"));
+    $("another").addEventListener("click", () => {
+      remember("job", "");
+      this.show("ask");
+    });
     $("explore-fit").addEventListener("click", () => page.open(this.fitted.model, this.fitted.state));
     const drop = $("drop");
     for (const name of ["dragover", "dragenter"]) {
@@ -40,15 +45,23 @@ export class Loop {
       this.choose(e.dataTransfer.files[0]);
     });
     link.on("job", (message) => message.job === this.job && this.take(message));
+    link.on("error", (message) => message.of === "watch" && this.forget());
     link.on("frame", ({ numbers: [length], body }) => this.frame(length, body));
     link.on("open", () => this.job && link.say({ type: "watch", job: this.job }));
     this.show("ask");
     this.tell();
+    this.job = recalled("job"); // a job that ran when the page was reloaded
   }
 
   show(name) {
     for (const id of ["ask", "work", "found"]) $(id).hidden = id !== name;
     if (name !== "found") $("report").removeAttribute("src");
+  }
+
+  /** The job is not there any more: the server was started anew. */
+  forget() {
+    this.job = null;
+    remember("job", "");
   }
 
   async choose(file) {
@@ -142,6 +155,7 @@ export class Loop {
     try {
       const answer = await request(`/api/jobs/${kind}`, values, { method: "POST", body });
       this.job = (await answer.json()).job;
+      remember("job", this.job);
       this.link.say({ type: "watch", job: this.job });
     } catch (error) {
       this.fail(error.message);
@@ -154,6 +168,7 @@ export class Loop {
   }
 
   fail(text, parts = []) {
+    if (text) remember("job", "");
     this.show("ask");
     $("failed").textContent = text;
     $("kept").hidden = !parts.length;
@@ -179,6 +194,7 @@ export class Loop {
   }
 
   take({ state, stages, answer }) {
+    if (state === "waiting" || state === "running") this.show("work");
     if (state === "waiting") this.stages([t("loop_waiting")]);
     else this.stages(stages);
     if (stages.length && !stages.at(-1).includes("film")) $("progress").removeAttribute("value");
@@ -274,6 +290,7 @@ export class Loop {
       return item;
     }));
     $("report").src = this.part("report.html");
+    for (const id of ["verdict", "sentence", "added", "figures", "evidence", "errors"]) explain($(id), list("terms"));
   }
 
   movie(parts, more) {

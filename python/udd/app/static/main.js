@@ -6,6 +6,7 @@ import { Energy } from "./energy.js";
 import { exporting } from "./export.js";
 import { Loop } from "./film.js";
 import { listen, tabs } from "./keys.js";
+import { Look, recalled, remember } from "./look.js";
 import { Link, request } from "./link.js";
 import { Panel } from "./panel.js";
 import { PhaseView, PlaneView } from "./phase.js";
@@ -13,6 +14,7 @@ import { Player } from "./player.js";
 import { Sections } from "./sections.js";
 import * as texts from "./texts.js";
 import { Trail } from "./trail.js";
+import { What } from "./what.js";
 
 const { t } = texts;
 const $ = (id) => document.getElementById(id);
@@ -30,6 +32,8 @@ class Page {
     this.sections = new Sections(this.link, this);
     this.diagram = new Diagram(this.link, this);
     this.energy = new Energy(this);
+    this.what = new What();
+    this.look = new Look();
     this.loop = new Loop(this.link, this);
     this.disk = new DiskView($("disk"), (place, done) => this.drag(place, done));
     this.phase = new PhaseView($("phase"));
@@ -143,8 +147,9 @@ class Page {
     let given = null;
     try {
       given = url.read(location.hash, this.catalogue);
+      if (given?.changed.length) this.notice(given.changed.join(" "), true);
     } catch (error) {
-      this.notice(error.message, true);
+      this.notice(`${error.message} ${t(first ? "link_instead" : "link_stays", { preset: t(`preset_${this.catalogue.presets[0].key}`) })}`, true);
     }
     if (!given && !first) return;
     const { key, model, state } = this.catalogue.presets[0];
@@ -159,7 +164,7 @@ class Page {
   // --- controls
 
   controls() {
-    $("play").addEventListener("click", () => this.play(!this.player.playing));
+    $("play").addEventListener("click", () => (this.over ? this.begin(this.home.model, this.home.state) : this.play(!this.player.playing)));
     $("step").addEventListener("click", () => this.step());
     $("restart").addEventListener("click", () => this.begin(this.home.model, this.home.state));
     $("again").addEventListener("click", () => this.begin(this.home.model, this.home.state));
@@ -167,6 +172,13 @@ class Page {
     $("speed").addEventListener("change", () => this.setSpeed(Number($("speed").value)));
     $("twin").addEventListener("change", () => this.begin(this.home.model, this.shownState()));
     $("share").addEventListener("click", () => this.share());
+    $("open").addEventListener("click", () => $("open-run").showModal());
+    $("open-run").addEventListener("close", () => {
+      const text = $("open-link").value.trim();
+      if ($("open-run").returnValue !== "open" || !text) return;
+      location.hash = text.slice(text.indexOf("#") + 1);
+      this.page($("to-explore"), true);
+    });
     $("projector").addEventListener("click", () => this.projector());
     $("help").addEventListener("click", () => $("keys").showModal());
     $("key-list").replaceChildren(...texts.list("keys").flatMap(([key, what]) => ["dt", "dd"].map((tag, k) => {
@@ -175,13 +187,13 @@ class Page {
       return e;
     })));
     exporting(this);
-    this.showMap = tabs(["section", "diagram", "energy"].map((n) => $(`tab-${n}`)), (id) => {
+    this.showMap = tabs(["section", "diagram", "energy", "what"].map((n) => $(`tab-${n}`)), (id) => {
       this.tab = id.slice(4);
       this.mapsDue = 0;
       if (this.home) this.toAddress();
     });
-    this.page = tabs([$("to-explore"), $("to-film")], () => {});
-    this.page($("to-explore"));
+    this.page = tabs([$("to-explore"), $("to-film")], (id) => remember("page", id));
+    this.page($(recalled("page") === "to-film" && !location.hash ? "to-film" : "to-explore"));
     this.showMap($("tab-section"));
     this.setSpeed(1);
     this.play(!this.still);
@@ -199,6 +211,8 @@ class Page {
       1: () => this.showMap($("tab-section")),
       2: () => this.showMap($("tab-diagram")),
       3: () => this.showMap($("tab-energy")),
+      4: () => this.showMap($("tab-what")),
+      t: () => this.look.dark(),
       "?": () => $("keys").showModal(),
       "+": () => this.faster(1),
       "-": () => this.faster(-1),
@@ -240,13 +254,12 @@ class Page {
   }
 
   projector() {
-    const on = document.body.classList.toggle("projector");
-    $("projector").setAttribute("aria-pressed", String(on));
+    this.look.projector();
   }
 
   async share() {
     this.toAddress();
-    await this.copy(location.href, t("shared"));
+    await this.copy(location.hash, t("shared")); // without the token and the name of this machine
   }
 
   async copy(text, said) {
@@ -331,9 +344,12 @@ class Page {
     const time = player.at / about.per_unit;
     this.disk.draw(radius, this.dragged ? disks.slice(0, 1) : disks, drive * time);
     const names = kind === "disk" ? ["J", "Y", "Z"] : ["omega", "y", "z"];
-    this.phase.draw(trails, names.map((n) => (n === "omega" ? "ω" : n)));
+    const units = kind === "disk" ? ["cm²/s", "cm", "cm"] : ["", "", ""];
+    this.phase.draw(trails, names.map((n, k) => [n === "omega" ? "ω" : n, units[k], this.scale(n)]));
     this.plane.draw(trails, this.scale(names[1]), radius, [t(`axis_${names[1]}`), t(`axis_${names[2]}`)]);
+    if (this.dragged) Object.assign(rows[0], { [y]: this.dragged.y, [z]: this.dragged.z, 0: 0 });
     this.tell(rows, time, about);
+    if (this.tab === "what") this.what.draw(this.home.model, rows[0], about);
   }
 
   tell(rows, time, about) {
@@ -361,7 +377,12 @@ class Page {
   end() {
     const { ended, failed } = this.player;
     if (ended?.outcome === "full") return this.begin(this.home.model, this.shownState(), { keepTrail: true });
-    $("over").hidden = !ended && !failed;
+    const over = Boolean(ended || failed);
+    if (over !== this.over) {
+      this.over = over;
+      $("play").textContent = t(over ? "again" : this.player.playing ? "pause" : "play");
+    }
+    $("over").hidden = !over;
     if (failed) $("over-text").textContent = failed;
     if (!ended) return;
     const unit = this.home.model.kind === "disk" ? "second" : "unit_of_time";

@@ -195,7 +195,7 @@ export class Panel {
     });
     const box = document.createElement("div");
     box.className = "effect";
-    const head = document.createElement("h4");
+    const head = document.createElement("h2");
     const drop = document.createElement("button");
     drop.type = "button";
     drop.textContent = "×";

@@ -1,5 +1,5 @@
 // Phase space, turned with the mouse, and the path of the centre.
-import { Axes, Canvas, COLOURS, INK, line, SOFT, span } from "./plot.js";
+import { Axes, Canvas, COLOURS, GRID, INK, line, SOFT, span, ticks } from "./plot.js";
 import { fading } from "./trail.js";
 
 export class PhaseView extends Canvas {
@@ -70,7 +70,7 @@ export class PhaseView extends Canvas {
   frame(c, project, labels) {
     const [x, y, z] = this.reach;
     const corner = (k) => project(k & 1 ? x : -x, k & 2 ? y : -y, k & 4 ? z : -z);
-    c.strokeStyle = "#e0e0e0";
+    c.strokeStyle = GRID;
     c.lineWidth = 1;
     for (let k = 0; k < 8; k++) {
       for (const bit of [1, 2, 4]) if (!(k & bit)) line(c, ...corner(k), ...corner(k | bit));
@@ -83,7 +83,19 @@ export class PhaseView extends Canvas {
     const ends = [[x, 0, 0], [0, y, 0], [0, 0, z]];
     for (const [k, end] of ends.entries()) {
       line(c, ...project(...end.map((v) => -v)), ...project(...end));
-      c.fillText(labels[k], ...project(...end.map((v) => 1.16 * v)));
+      const [name, unit, scale] = labels[k];
+      c.fillStyle = INK;
+      c.fillText(unit ? `${name} [${unit}]` : name, ...project(...end.map((v) => 1.36 * v)));
+      c.fillStyle = SOFT;
+      const small = c.font;
+      c.font = small.replace(/^[\d.]+/, (size) => String(size * 0.8));
+      for (const [value, text] of ticks(-this.reach[k] * scale, this.reach[k] * scale, 3)) {
+        if (Math.abs(value) < 0.3 * this.reach[k] * scale) continue;
+        const [px, py] = project(...end.map((v) => (v ? value / scale : 0)));
+        c.fillRect(px - 1.5, py - 1.5, 3, 3);
+        c.fillText(text, px, py + this.text * 0.85);
+      }
+      c.font = small;
     }
   }
 }

@@ -1,8 +1,22 @@
 // Canvases: sharp on any screen, with axes.
 export const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6d00"]; // Okabe and Ito
-export const INK = "#1b1b1b";
-export const SOFT = "#565656";
-export const FAINT = "#cfcfcf";
+export let INK = "#1b1b1b";
+export let SOFT = "#565656";
+export let FAINT = "#cfcfcf";
+export let GROUND = "#ffffff";
+export let GRID = "#e6e6e6";
+
+const canvases = new Set();
+
+/** Take the colours of the page's style sheet, which knows dark and light. */
+export function recolour() {
+  const style = getComputedStyle(document.body);
+  const read = (name) => style.getPropertyValue(name).trim();
+  [INK, SOFT, FAINT, GROUND, GRID] = ["--ink", "--soft", "--faint", "--ground", "--grid"].map(read);
+  const dark = document.documentElement.dataset.theme === "dark";
+  [COLOURS[0], COLOURS[5], COLOURS[6]] = dark ? ["#56b4e9", "#0072b2", "#ffffff"] : ["#0072b2", "#56b4e9", "#000000"];
+  for (const canvas of canvases) canvas.changed = true;
+}
 
 /** A canvas whose units are CSS pixels. */
 export class Canvas {
@@ -11,6 +25,7 @@ export class Canvas {
     this.context = element.getContext("2d");
     this.width = this.height = 0;
     this.changed = true;
+    canvases.add(this);
     new ResizeObserver(() => (this.changed = true)).observe(element);
   }
 
@@ -29,7 +44,7 @@ export class Canvas {
     return this.width > 20 && this.height > 20;
   }
 
-  clear(colour = "#ffffff") {
+  clear(colour = GROUND) {
     this.context.fillStyle = colour;
     this.context.fillRect(0, 0, this.width, this.height);
   }
@@ -68,7 +83,7 @@ export class Axes extends Canvas {
     this.range = [x0, x1, y0, y1];
     c.font = `${s}px "Source Sans 3", "Helvetica Neue", Arial, sans-serif`;
     c.lineWidth = 1;
-    c.strokeStyle = "#e6e6e6";
+    c.strokeStyle = GRID;
     c.fillStyle = SOFT;
     c.textAlign = "center";
     c.textBaseline = "top";

@@ -22,7 +22,8 @@ export class Sections {
     link.on("section", (message) => {
       if (message.generation !== this.generation) return;
       const key = message.outcome === "finished" ? "crossings" : "crossings_ended";
-      this.said.textContent = t(key, { n: message.found, outcome: message.outcome });
+      const none = message.found === 0 && t(`section_none_${this.select.value}_${this.page.home.model.kind}`);
+      this.said.textContent = none || t(key, { n: message.found, outcome: message.outcome });
     });
     link.on("open", () => (this.key = ""));
   }

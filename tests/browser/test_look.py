@@ -1,0 +1,79 @@
+"""The looks of the page: dark, projector, phone; what a reload keeps; what is said of links."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from browser_for_tests import SIZES, Opened, until
+
+axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+
+
+def test_the_panel_shows_the_equations_with_the_numbers_of_the_moment(opened: Opened) -> None:
+    page = opened.go("#model=disk&W=0.03&state=0,0.001,0.04,0")
+    page.click("#tab-what")
+    until(page, "document.getElementById('equations').textContent.includes('dZ/dT')")
+    before = page.locator("#equations").text_content()
+    page.wait_for_timeout(600)
+    assert page.locator("#equations").text_content() != before
+    assert page.evaluate("document.querySelector('.what img').naturalWidth") > 100
+
+
+def test_dark_and_projector_are_kept_over_a_reload(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#dark")
+    page.click("#projector")
+    page.reload()
+    until(page, "globalThis.udd?.stats.frames > 3")
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+    assert page.evaluate("document.body.classList.contains('projector')")
+    assert axe.Axe().run(page).violations_count == 0
+
+
+def test_a_phone_shows_the_disk_and_play_at_once_and_scrolls(browser: Any, link: str) -> None:
+    SIZES["phone"] = (390, 844)
+    one = Opened(browser, link, "phone")
+    page = one.go()
+    for part in ("#disk", "#play"):
+        box = page.locator(part).bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] <= 844
+    assert page.locator("#plane").is_visible()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert page.eval_on_selector("#phase", "e => getComputedStyle(e).touchAction") == "pan-y"
+    assert axe.Axe().run(page).violations_count == 0
+    one.context.close()
+
+
+def test_a_number_far_beyond_its_range_in_a_link_is_changed_and_said(opened: Opened) -> None:
+    page = opened.go("#model=disk&W=50&state=0,0.001,0.04,0")
+    assert "W = 5000 cm/s was changed to 14 cm/s" in page.locator("#toast").text_content()
+
+
+def test_a_run_is_copied_without_the_token_and_opened_again(opened: Opened) -> None:
+    page = opened.go("#model=disk&W=0.031&state=0,0.001,0.04,0")
+    page.click("#open")
+    page.fill("#open-link", "http://else.where/?token=x#model=dle&w=3.5&state=1,1,0")
+    page.click("#open-go")
+    until(page, "udd.home.model.w === 3.5")
+
+
+def test_an_ended_run_s_button_starts_it_again(opened: Opened) -> None:
+    page = opened.go()
+    page.select_option("#preset", "ejected")
+    until(page, "!document.getElementById('over').hidden")
+    assert page.locator("#play").text_content() == "Start again"
+    page.click("#play")
+    until(page, "document.getElementById('over').hidden")
+
+
+def test_a_diagram_has_first_pixels_soon_and_is_kept(opened: Opened) -> None:
+    page = opened.go("#model=dle&w=3.9&state=1,1,0.01&tab=diagram")
+    until(page, "udd.diagram.found !== null", 20)
+    until(page, "!udd.diagram.working", 60)
+    generation = page.evaluate("udd.diagram.kept.size")
+    assert generation == 1
+    page.click("#tab-section")
+    page.click("#tab-diagram")
+    assert page.evaluate("udd.diagram.working") is False
