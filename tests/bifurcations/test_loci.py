@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import integrate
 
 import udd
 
@@ -136,3 +137,50 @@ def test_the_second_lyapunov_coefficient_is_that_of_the_normal_form() -> None:
     assert (np.abs(bautin.values) <= bautin.errors + 1e-12).all()
     # The eigenvector has length 1, so that |z|^2 is twice its coefficient's; and over the frequency.
     assert bautin.coefficients["l2"] == pytest.approx(4 * 0.7 / 2.0, rel=1e-7)
+
+
+def _far(t: float, s: np.ndarray) -> float:
+    return float(40.0 - np.abs(s).max())
+
+
+_far.terminal = True  # type: ignore[attr-defined]
+PLANE = udd.Model(["x", "v"], ["v", "x^2 - m + v*(b + x)"], {"b": 0.85, "m": 1.0})
+
+
+def test_homoclinic_orbits_are_followed_over_two_parameters() -> None:
+    (one,) = udd.connections(PLANE, "b", (0.6, 0.8), n=3)
+    curve = udd.locus(one, "m", (0.25, 1.5), within=(0.0, 2.0), ds=0.2)
+    assert curve.kind == "homoclinic" and curve.ends == ("the bound 0.25", "the bound 1.5")
+    assert curve.parameters == ("b", "m") and curve.values[0, 1] == 0.25 and curve.values[-1, 1] == 1.5
+    assert all(one.error < 1e-9 for one in curve.solutions if isinstance(one, udd.Connection))
+    # Beside it the saddle's unstable manifold passes the saddle on its two sides, by another integrator.
+    b, m = curve.values[-1]
+    saddle = np.sqrt(m)
+
+    def end(b: float) -> float:
+        growing = (b + saddle + np.sqrt((b + saddle) ** 2 + 8 * saddle)) / 2
+        start = np.array([saddle, 0.0]) - 1e-6 * np.array([1.0, growing])
+        run = integrate.solve_ivp(
+            lambda t, s: [s[1], s[0] ** 2 - m + s[1] * (b + s[0])],
+            [0.0, 60.0],
+            start,
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=_far,
+        )
+        return float(run.y[0, -1])
+
+    assert {end(b + d) > 5.0 for d in (-1e-7, 1e-7)} == {False, True}
+    # Towards the Bogdanov-Takens point at 0 it is b = 5/7 sqrt(m) + ..., of which the square root is exact.
+    assert curve.values[0, 0] / np.sqrt(0.25) == pytest.approx(5 / 7, rel=0.3)
+
+
+def test_a_shilnikov_orbit_of_the_damped_model_leads_to_that_without_damping() -> None:
+    found = udd.connections(udd.DLE(3.38), "w", (3.3767, 3.3769), n=3, t_max=11.0)
+    one = next(one for one in found if one.kind == "homoclinic")
+    curve = udd.locus(one, "B", (0.0, 0.002), within=(3.0, 4.0), ds=0.2)
+    damped = curve.solutions[-1]
+    assert curve.ends == ("the bound 0", "the bound 0.002") and isinstance(damped, udd.Connection)
+    back = udd.locus(damped, "B", (0.0, 0.002), within=(3.0, 4.0), ds=0.2)
+    assert back.values[0] == pytest.approx([3.3768624337325, 0.0], abs=1e-10)

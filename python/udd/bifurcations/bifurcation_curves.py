@@ -21,6 +21,8 @@ from .branch_continuation import bounds_of, in_unit_of, unit_of
 from .branch_ends import hopf_end, vanishing_part
 from .branch_following import CLOSED
 from .branch_solutions import solution_at
+from .connecting_orbits import Connection
+from .connection_curves import ConnectionWay
 from .conservative_families import FamilyCurve
 from .flow_map import Floats
 from .locus_points import ENDS, LocusPoint, Segment, points_between, watched_functions
@@ -49,7 +51,7 @@ class Locus(Drawable):
         The first is that of the point from which the curve was followed.
     values : ndarray, shape (n, 2)
         Their values along the curve.
-    solutions : tuple of Equilibrium or PeriodicOrbit
+    solutions : tuple of Equilibrium, PeriodicOrbit or Connection
         What bifurcates at each of them.
     frequencies : ndarray, shape (n,)
         As in :class:`BifurcationPoint`.
@@ -64,7 +66,7 @@ class Locus(Drawable):
     kind: str
     parameters: tuple[str, str]
     values: Floats
-    solutions: tuple[Equilibrium | PeriodicOrbit, ...]
+    solutions: tuple[Equilibrium | PeriodicOrbit | Connection, ...]
     frequencies: Floats
     lyapunov_coefficients: Floats
     ends: tuple[str, str]
@@ -87,7 +89,7 @@ class Locus(Drawable):
 @renamed(step="ds", longest="ds_max", most="max_points")
 @checked_arguments
 def locus(
-    point: BifurcationPoint,
+    point: BifurcationPoint | Connection,
     parameter: str,
     bounds: Sequence[float] = (0.0, np.inf),
     *,
@@ -100,9 +102,9 @@ def locus(
 
     Parameters
     ----------
-    point : BifurcationPoint
+    point : BifurcationPoint or Connection
         A fold, a Hopf, Neimark-Sacker, symmetry-breaking or period-doubling point of
-        :func:`udd.continuation`.
+        :func:`udd.continuation`; or a homoclinic or heteroclinic orbit.
     parameter : str
         The second parameter.
     bounds, within : (float, float)
@@ -143,6 +145,11 @@ def locus(
     >>> print(abs(w - (1 - B) / (B * (1 + B))).max() < 1e-10)
     True
     """
+    if isinstance(point, Connection):
+        box = np.array([bounds_of(within), bounds_of(bounds)])
+        ds = number("ds", ds, above=0.0)
+        ds_max = max(ds, number("ds_max", ds_max, above=0.0))
+        return _of_connections(point, parameter, box, ds, ds_max, whole("max_points", max_points, 1))
     if not isinstance(point, BifurcationPoint) or point._curve is None or point._place is None:
         raise ModelError("a bifurcation point of udd.continuation is needed")
     if point.kind not in FUNCTIONS or point.kind == "branch point":
@@ -181,6 +188,27 @@ def locus(
         np.array(coefficients),
         (back.end, on.end or back.end),
         (*back.points[::-1], *on.points),
+    )
+
+
+def _of_connections(
+    start: Connection, parameter: str, box: Floats, ds: float, ds_max: float, most: int
+) -> Locus:
+    """The curve of connections over two parameters."""
+    if parameter == start.parameter:
+        raise ModelError(f"the second parameter must be another than {parameter}")
+    way = ConnectionWay((start.parameter, parameter), box, ds, ds_max, most)
+    (back, first), (on, last) = (way.follow(start, sense) for sense in (-1.0, 1.0))
+    found = [*back[:0:-1], *on]
+    nothing = np.full(len(found), np.nan)
+    return Locus(
+        start.kind,
+        way.parameters,
+        np.array([values for values, _ in found]),
+        tuple(one for _, one in found),
+        nothing,
+        nothing,
+        (first, last),
     )
 
 

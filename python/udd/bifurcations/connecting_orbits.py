@@ -59,6 +59,7 @@ class Connection(Drawable):
     t: Floats
     state: Floats
     nearest: float
+    _problem: Problem | None = field(default=None, repr=False)
 
     @property
     def single(self) -> float:
@@ -180,7 +181,7 @@ def found_by(problem: Problem, parameter: str) -> Connection:
     t = np.linspace(0.0, problem.span, len(problem.nodes))
     kind = "heteroclinic" if (problem.mirror < 0).any() else "homoclinic"
     state = problem.flow.full(problem.nodes)
-    return Connection(kind, parameter, value, error, rest, t, state, problem.nearest())
+    return Connection(kind, parameter, value, error, rest, t, state, problem.nearest(), problem)
 
 
 @dataclass(eq=False)
