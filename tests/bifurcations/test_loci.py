@@ -184,3 +184,44 @@ def test_a_shilnikov_orbit_of_the_damped_model_leads_to_that_without_damping() -
     assert curve.ends == ("the bound 0", "the bound 0.002") and isinstance(damped, udd.Connection)
     back = udd.locus(damped, "B", (0.0, 0.002), within=(3.0, 4.0), ds=0.2)
     assert back.values[0] == pytest.approx([3.3768624337325, 0.0], abs=1e-10)
+
+
+def test_homoclinic_orbits_are_born_at_a_bogdanov_takens_point() -> None:
+    rest = min(udd.equilibria(PLANE), key=lambda one: float(one.state[0]))
+    (hopf,) = udd.continuation(rest, "b", (-1.0, 3.0)).find("Hopf")
+    (point,) = udd.locus(hopf, "m", (-0.5, 2.0), within=(-1.0, 3.0)).points
+    assert point.kind == "Bogdanov-Takens"
+    assert point.values == pytest.approx([0.0, 0.0], abs=1e-12)
+    # u' = v, v' = ... + u^2 + u v.
+    assert point.coefficients == pytest.approx({"a": 1.0, "b": 1.0}, abs=1e-9)
+    curve = udd.locus(point, bounds=(0.01, 0.5), within=(-1.0, 3.0), ds=0.2)
+    assert curve.kind == "homoclinic" and curve.ends == ("the bound 0.01", "the bound 0.5")
+    assert curve.values[0, 0] == pytest.approx(5 / 7 * 0.1, rel=0.01)
+
+
+def test_folds_of_cycles_are_born_at_a_bautin_point() -> None:
+    # r' = r (mu + a r^2 - 0.7 r^4) has its folds on mu = -a^2/2.8, for a above 0.
+    square = "(x^2 + y^2)"
+    radial = f"(mu + a*{square} - 0.7*{square}^2)"
+    model = udd.Model(["x", "y"], [f"x*{radial} - 2*y", f"y*{radial} + 2*x"], {"mu": -0.1, "a": -0.4})
+    (hopf,) = udd.continuation(udd.equilibria(model, near=[0.0, 0.0])[-1], "mu", (-0.5, 0.5)).find("Hopf")
+    (point,) = udd.locus(hopf, "a", (-1.0, 1.0), within=(-0.5, 0.5)).points
+    curve = udd.locus(point, bounds=(-1.0, 1.0), within=(-0.5, 0.5))
+    assert curve.kind == "fold" and "a Bautin point" in curve.ends and "the bound 1" in curve.ends
+    mu, a = curve.values.T
+    np.testing.assert_allclose(mu, -(a**2) / 2.8, atol=1e-10)
+    assert (a > 0.0).all() and len(curve) > 5
+    with pytest.raises(udd.UddError, match="one over a, not mu"):
+        udd.locus(point, "mu")
+
+
+def test_a_saddle_node_on_an_invariant_circle_is_named() -> None:
+    # On the unit circle the angle turns at the rate m + cos(angle).
+    radial = "(1 - x^2 - y^2)"
+    model = udd.Model(["x", "y"], [f"x*{radial} - y*(m + x)", f"y*{radial} + x*(m + x)"], {"m": 1.5})
+    orbit = udd.periodic_orbit(model, [1.0, 0.0])
+    assert orbit.period == pytest.approx(2 * np.pi / np.sqrt(1.5**2 - 1), abs=1e-10)
+    branch = udd.continuation(orbit, "m", (0.5, 2.0), direction="down", max_period=200.0)
+    snic = udd.connection(branch)
+    assert snic.kind == "SNIC" and abs(snic.value - 1.0) <= snic.error < 1e-10
+    assert snic.equilibrium.state == pytest.approx([-1.0, 0.0], abs=1e-6) and "SNIC" in repr(snic)

@@ -24,6 +24,7 @@ from .branch_solutions import solution_at
 from .connecting_orbits import Connection
 from .connection_curves import ConnectionWay
 from .conservative_families import FamilyCurve
+from .curves_born_at import fold_of_cycles_at, homoclinic_at
 from .flow_map import Floats
 from .locus_points import ENDS, LocusPoint, Segment, points_between, watched_functions
 from .pseudo_arclength import CorrectorFailed
@@ -89,8 +90,8 @@ class Locus(Drawable):
 @renamed(step="ds", longest="ds_max", most="max_points")
 @checked_arguments
 def locus(
-    point: BifurcationPoint | Connection,
-    parameter: str,
+    point: BifurcationPoint | LocusPoint | Connection,
+    parameter: str | None = None,
     bounds: Sequence[float] = (0.0, np.inf),
     *,
     within: Sequence[float] = (0.0, np.inf),
@@ -102,11 +103,12 @@ def locus(
 
     Parameters
     ----------
-    point : BifurcationPoint or Connection
+    point : BifurcationPoint, LocusPoint or Connection
         A fold, a Hopf, Neimark-Sacker, symmetry-breaking or period-doubling point of
-        :func:`udd.continuation`; or a homoclinic or heteroclinic orbit.
-    parameter : str
-        The second parameter.
+        :func:`udd.continuation`; a homoclinic or heteroclinic orbit; or a point of another curve at which one
+        is born: the folds of cycles of a Bautin point, the homoclinic orbits of a Bogdanov-Takens point.
+    parameter : str, optional
+        The second parameter; by default that of the other curve.
     bounds, within : (float, float)
         The curve ends where the second or the first parameter leaves these bounds.
     ds, ds_max : float
@@ -145,6 +147,17 @@ def locus(
     >>> print(abs(w - (1 - B) / (B * (1 + B))).max() < 1e-10)
     True
     """
+    if isinstance(point, LocusPoint):
+        parameter = point.parameters[1] if parameter is None else parameter
+        if parameter != point.parameters[1]:
+            raise ModelError(f"the curve born there is one over {point.parameters[1]}, not {parameter}")
+        if point.kind not in ("Bautin", "Bogdanov-Takens"):
+            raise ModelError(f"no curve is born at a {point.kind} point that could be followed")
+        limits = bounds_of(within)
+        bautin = point.kind == "Bautin"
+        point = fold_of_cycles_at(point, limits) if bautin else homoclinic_at(point, limits)
+    if parameter is None:
+        raise ModelError("say which second parameter is varied")
     if isinstance(point, Connection):
         box = np.array([bounds_of(within), bounds_of(bounds)])
         ds = number("ds", ds, above=0.0)

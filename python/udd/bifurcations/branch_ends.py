@@ -28,6 +28,7 @@ __all__ = ["closes", "hopf_end", "origin_of", "size_of", "vanishing_part"]
 _STEPS = 24  # along the other branch, in either direction, until the bifurcation is met
 _RATIO = 1.3  # of the cycle's period to that of the Hopf bifurcation at most
 _FARTHEST = 3.0  # sizes of the cycle between its centre and the equilibrium
+_COLLAPSED = 0.02  # of its size before, below which an orbit is an equilibrium
 _SHORTEST = 1e-4  # step along the other branch
 
 
@@ -41,7 +42,7 @@ def vanishing_part(curve: AnyCurve, a: Floats, b: Floats) -> float | None:
     before, after = _shape(curve, a), _shape(curve, b)
     first = float(np.linalg.norm(before))
     last = float((before * after).sum()) / first if first else 0.0
-    return first / (first - last) if last <= 0.0 and first > 0.0 else None
+    return first / (first - last) if first > 0.0 and last <= _COLLAPSED * first else None
 
 
 def size_of(curve: PeriodicOrbitCurve, u: Floats) -> float:

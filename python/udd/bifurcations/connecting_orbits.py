@@ -17,6 +17,7 @@ from .equilibrium_curve import expansion
 from .equilibrium_search import equilibrium_at, refined
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats, FlowMap
+from .saddle_node_cycles import saddle_node_on
 from .shooting_curve import HELD, PeriodicOrbitCurve
 from .solutions import Equilibrium
 
@@ -35,8 +36,9 @@ class Connection(Drawable):
 
     Attributes
     ----------
-    kind : {"homoclinic", "heteroclinic"}
-        Whether it comes back to the same equilibrium, or arrives at its mirror image.
+    kind : {"homoclinic", "heteroclinic", "SNIC"}
+        Whether it comes back to the same equilibrium, or arrives at its mirror image; "SNIC" if it comes back
+        to a fold of equilibria, a saddle-node on an invariant circle: then `state` is the longest cycle.
     parameter : str
     value : float
         The parameter's value: at others there is no such orbit.
@@ -75,6 +77,8 @@ class Connection(Drawable):
         values = self.equilibrium.eigenvalues
         others = values[np.sign(values.real) != np.sign(self.single)]
         near = others[np.argsort(np.abs(others.real), kind="stable")]
+        if not len(near):
+            return complex("nan")
         return complex(near[0].real, abs(near[0].imag))
 
     @property
@@ -152,6 +156,12 @@ def connection(branch: Branch) -> Connection:
         raise ModelError(
             f"a connection is looked for over a parameter of the model, not over {branch.parameter}"
         )
+    fold = saddle_node_on(branch)
+    if fold is not None and isinstance(fold.solution, Equilibrium):
+        nodes, rest = curve.flow.full(curve.nodes(place.u)), fold.solution
+        t: Floats = np.linspace(0.0, curve.span(place.u), curve.pieces, endpoint=False)
+        away = np.linalg.norm(curve.flow.reduced(nodes - rest.state) / curve.flow.size, axis=1)
+        return Connection("SNIC", branch.parameter, fold.value, fold.error, rest, t, nodes, float(away.min()))
     return found_by(Problem.of(curve, place.u), branch.parameter)
 
 

@@ -1,0 +1,79 @@
+"""Saddle-nodes on invariant circles (SNIC): cycles that end where two equilibria are born on them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import optimize
+
+from udd.errors import IntegrationError
+
+from .bifurcation_functions import test_functions_at
+from .bifurcation_location import bifurcations_between, location_error, point_at
+from .branch import BifurcationPoint, Branch
+from .branch_solutions import solution_at
+from .equilibrium_curve import EquilibriumCurve
+from .flow_map import Floats
+from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at
+from .shooting_curve import PeriodicOrbitCurve
+
+__all__ = ["saddle_node_on"]
+
+_BESIDE = 1e-2  # of the fold along the branch of equilibria, from where it is located
+_NEAR = 0.5  # typical sizes between the fold and the slowest node of the cycle at most
+_GROWN = 1.2  # factor of the period over the places that are compared
+_AGREES = 1.3  # by this factor at most the square of the period times the distance changes
+
+
+def saddle_node_on(branch: Branch) -> BifurcationPoint | None:
+    """The fold of equilibria in which the longest cycles of a branch end; None if they end in another way.
+
+    The period grows there with the inverse square root of the distance in the parameter, not with its
+    logarithm, as towards an orbit homoclinic to a saddle.
+    """
+    longest = int(np.argmax(branch.periods))
+    curve, place = branch._places[longest]
+    if not isinstance(curve, PeriodicOrbitCurve):
+        return None
+    fold = _fold_near(curve, place.u)
+    if fold is None:
+        return None
+    near = np.flatnonzero(branch.periods >= branch.periods[longest] / _GROWN**3)
+    away, periods = np.abs(branch.values[near] - fold.value), branch.periods[near]
+    if periods.max() < _GROWN * periods.min():
+        return None
+    square = periods**2 * away
+    return fold if square.min() > 0.0 and square.max() < _AGREES * square.min() else None
+
+
+def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
+    """The fold of equilibria near the slowest node of a cycle."""
+    flow, nodes, values = curve.flow, curve.nodes(u), curve.values_at(u)
+    speed = np.linalg.norm(
+        flow.with_values(values).rates(0.0, flow.full(nodes))[:, flow.kept] * flow.clock / flow.size, axis=1
+    )
+    slow = nodes[int(np.argmin(speed))]
+    rests = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
+
+    def equations(y: Floats) -> Floats:
+        residual, matrix = rests.equations(y)
+        assert isinstance(matrix, np.ndarray)
+        return np.append(residual, np.linalg.det(matrix[:, :-1]))
+
+    try:
+        found = optimize.root(equations, rests.pack(slow, curve.value(u)))
+        guess = found.x
+        if not found.success or np.linalg.norm(rests.state(guess) / flow.size - slow / flow.size) > _NEAR:
+            return None
+        along = np.linalg.svd(rests.equations(guess)[1])[2][-1]
+        start = newton_corrector(rests, guess - _BESIDE * along, along)
+        here = CurvePoint(start, tangent_at(rests, start, along))
+        end = newton_corrector(rests, here.u + 2.0 * _BESIDE * here.tangent, here.tangent)
+        there = CurvePoint(end, tangent_at(rests, end, here.tangent))
+        signs, step = (test_functions_at(rests, here), test_functions_at(rests, there)), 2.0 * _BESIDE
+        for kind, sigma, place, at in bifurcations_between(rests, here, step, *signs):
+            if kind == "fold":
+                errors = location_error(rests, here, sigma, place, step, "fold")
+                return point_at(rests, kind, place, at, solution_at(rests, place.u), 0.0, errors)
+    except (CorrectorFailed, IntegrationError, ValueError, np.linalg.LinAlgError):
+        return None
+    return None
