@@ -77,7 +77,7 @@ def test_the_page_stands_alone(pages: dict[str, str], name: str) -> None:
     assert not page.all("script") + page.all("link") + page.all("iframe")
     for tag, attrs in page.tags:
         for key in ("src", "href", "srcset", "data", "poster"):
-            assert (attrs.get(key) or "data:").startswith("data:"), (tag, key)
+            assert (attrs.get(key) or "data:").startswith(("data:", "#")), (tag, key)
     style = re.search(r"<style>(.*?)</style>", source, re.S)
     assert style is not None
     assert "url(" not in style[1]
@@ -119,7 +119,7 @@ def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:
     assert words.with_error(effect.parameters["b"], effect.errors["b"]) in text
     for h in found.error_before.horizons:
         assert words.length(found.error_after.at(h)[0], "m") in text
-    else_ = text[text.index("What else it could be") : text.index("What these data cannot say")]
+    else_ = text[text.rindex("What else it could be") : text.rindex("What these data cannot say")]
     assert "Slip c Z" in else_
     assert "film a second drive" in text
     assert "camera turned clockwise" in text
@@ -319,3 +319,28 @@ def test_camera_parameters_are_explained_where_they_appear() -> None:
     text = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0)).summary()
     assert "zero of the angle" in text
     assert "pivot above where it was taken to be, in lengths of the pendulum" in text
+
+
+def test_contents_guide_and_data_are_on_the_page(pages: dict[str, str]) -> None:
+    page, source = Page(pages["disk"]), pages["disk"]
+    targets = {attrs["href"] for tag, attrs in page.tags if tag == "a" and attrs["href"].startswith("#")}
+    there = {f"#{attrs['id']}" for tag, attrs in page.tags if tag == "section"}
+    assert targets == there and len(there) > 5
+    assert "How to read this page" in source
+    tables = [attrs for tag, attrs in page.tags if tag == "a" and "download" in attrs]
+    assert tables and all(one["href"].startswith("data:text/csv") for one in tables)
+    for puzzle in ("still there in the next", "over none [nats]", "a 24th of"):
+        assert puzzle not in source
+
+
+def test_errors_of_the_known_model_contain_what_it_lacks() -> None:
+    """Those that `udd.fit` reports of the same record, and not the hundredth part of them."""
+    from udd.report import tables
+
+    found = discovered.disk()
+    alone = udd.fit(found.measurement, udd.Disk(discovered.DRIVE))
+    row = next(row for row in tables.parameters(found) if row["name"] == "W")
+    error = float(row["before"].partition("±")[2])
+    unit = {"m/s": 1.0, "cm/s": 1e2, "mm/s": 1e3}[str(row["unit"])]
+    assert error == pytest.approx(unit * alone.errors["W"], rel=0.2)
+    assert alone.errors["W"] > 20 * found.baseline.errors["W"]

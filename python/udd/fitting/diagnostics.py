@@ -126,7 +126,7 @@ class Reading(OneLine):
         if self.step:
             said += f", read in steps of {factor * self.step:.3g}{unit}"
         if self.memory:
-            said += f" ({self.memory:.2f} of a frame's error is still there in the next)"
+            said += f" (the errors of neighbouring frames correlate by {self.memory:.2f})"
         return said
 
 

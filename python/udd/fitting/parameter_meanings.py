@@ -13,7 +13,7 @@ _CAMERA = {
     "up": "centre of the marks, above the disk's own (red mark on top)",
     "lag": "orientation seen later than position",
     "row": "rolling shutter: time per height in the picture",
-    "shutter": "a 24th of the squared time over which the pictures' positions are means",
+    "shutter": "blur by the shutter: its open time squared, divided by 24",
     "lens": "how much larger the lens shows what is 0.1 m from the picture's middle",
     "middle_y": "the picture's middle, right of the contact",
     "middle_z": "the picture's middle, above the contact",

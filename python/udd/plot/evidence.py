@@ -21,7 +21,9 @@ _LINE = 34  # letters of a candidate's title in one line
 
 
 def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: int = 12) -> Axes:
-    """The fall of chi2 that each candidate would bring, beside what it takes to be believed.
+    """The decrease in chi2 that each candidate would bring, with what it takes to be believed.
+
+    The effect that was added has the decrease that came about; the others have a first estimate.
 
     Parameters
     ----------
@@ -45,6 +47,7 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
     ax = new_axes(ax, size=(8.0, 1.5 + 0.3 * lines))
     chosen = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
+    fitted = decreases(discovery, stage)
     seen: set[str] = set()
     for k, scored in enumerate(scan):
         title = scored.candidate.title
@@ -59,7 +62,7 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
         )
         ax.barh(
             k,
-            max(scored.chi2, 0.1),
+            max(fitted.get(title, scored.chi2), 0.1),
             color=colour,
             edgecolor="#8a8a8a" if colour == "white" else colour,
             label=None if kind in seen else kind,
@@ -76,11 +79,16 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
     ax.set_ylim(max(len(scan), 1) - 0.4, -0.6)
     ax.set_xscale("log")
     ax.set_xlim(left=0.5)
-    ax.set_xlabel("evidence: fall of χ² if this effect were added")
+    ax.set_xlabel("evidence: decrease in χ² with this effect")
     legend_above(ax)
     tidy(ax)
     ax.grid(False, axis="y")
     return ax
+
+
+def decreases(discovery: Any, stage: int) -> dict[str, float]:
+    """The decrease in chi2 with the effect that was added after a search, by its name as a candidate."""
+    return {effect.tried or effect.title: effect.chi2 for effect in discovery.effects[stage : stage + 1]}
 
 
 def threshold(discovery: Any, stage: int) -> float:

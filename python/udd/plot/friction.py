@@ -47,7 +47,7 @@ def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = Non
     best = coefficient(model, omega)
     if fit is not None:
         low, high = np.quantile(speeds, [0.05, 0.95])
-        ax.axvspan(low, high, color="#f2f2f2", zorder=0, label="90 % of the frames")
+        ax.axvspan(low, high, color="#dedede", zorder=0, label="90 % of the frames")
         error = _error(fit, omega)
         ax.fill_between(
             omega,

@@ -306,7 +306,7 @@ def _round(discovery: Discovery, stage: int) -> tuple[Part, ...]:
     columns = {
         "title": Column("candidate", names=True),
         "equation": Column("equation"),
-        "chi2": Column("evidence", number=True),
+        "chi2": Column("decrease in χ²", number=True),
         "estimate": Column("estimate"),
         "said": Column(""),
     }
@@ -320,16 +320,16 @@ def _round(discovery: Discovery, stage: int) -> tuple[Part, ...]:
     curves = [{**row, "title": pretty(row["title"])} for row in tables.curves(discovery, stage)]
     columns = {
         "title": Column("curve", names=True),
-        "evidence": Column("evidence over none [nats]", number=True),
+        "evidence": Column("odds over no curve", number=True),
         "p": Column("probability by chance, for it alone", number=True),
     }
     smooth = replace(
         table(f"{round_heading(stage)}: the best curves", columns, curves), summary="Table of the best curves"
     )
     caption = (
-        "The longer the bar, the more the fit would improve; the scale is logarithmic. The estimates in the "
-        "table are first ones, made around the model as it was; what was added is fitted anew with "
-        "everything else."
+        "The longer the bar, the more the fit improves; the scale is logarithmic. The bar of the effect that "
+        "was added shows by how much χ² decreased; the other bars, and the estimates in the table, are first "
+        "ones, made around the model as it was."
     )
     bars = Figure(figures.evidence(discovery, stage), caption)
     return parts(Subheading(round_heading(stage)), bars, best, smooth if curves else None)

@@ -53,7 +53,8 @@ def orbits(discovery: Discovery) -> Image:
         plot.orbit(run, ax)
         ax.lines[0].set_color(colour)
         if run.outcome == "ejected":
-            ax.set_title(f"{words}\n(leaves the wheels after {run.t[-1] - run.t[0]:.3g} s)")
+            at = run.t[-1] - run.t[0]
+            ax.set_title(f"{words}\n(this free run loses contact after {at:.3g} s)")
     for ax in axes[1:]:
         ax.set_ylabel("")
         ax.tick_params(labelleft=False)

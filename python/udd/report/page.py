@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import csv
 import hashlib
+import io
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -20,6 +23,28 @@ from .document import Head, Report, Section
 
 if TYPE_CHECKING:
     from udd.discovery.results import Discovery
+
+
+#: Terms of the page, for its fold "How to read this page".
+GUIDE = (
+    ("Known model", "The equations that were given, fitted to the same data, before anything was added."),
+    (
+        "Held-out error",
+        "How far off a model is on data that no fit has seen, after it was let go for a time.",
+    ),
+    ("Noise floor", "The error that a faultless model would have: noise of the data and of its start alone."),
+    ("95 % interval", "The true value lies in it in 19 of 20 such cases; ± is one standard error."),
+    (
+        "Decrease in χ²",
+        "By how much the misfit, in units of the noise, decreases with an effect. Chance reaches the dashed "
+        "line once in a thousand searches.",
+    ),
+    (
+        "Consistent, constraint",
+        "How an effect enters: with the torque that goes with it, or as a change of the rolling alone.",
+    ),
+    ("Residual", "What an equation leaves over: noise about zero if the model is right."),
+)
 
 
 def report_of(
@@ -123,6 +148,8 @@ def write_page(report: Report, path: str | os.PathLike[str]) -> None:
     page = templates("udd.report").get_template("report.html")
     html = page.render(
         head=report.head,
+        guide=GUIDE,
+        data=_data(report),
         sections=report.sections,
         source=report.source,
         command=report.command,
@@ -130,6 +157,17 @@ def write_page(report: Report, path: str | os.PathLike[str]) -> None:
         versions=versions("udd", "numpy", "scipy"),
     )
     write_whole(Path(path), html.encode())
+
+
+def _data(report: Report) -> list[tuple[str, str]]:
+    """The tables of a report as files within it: their names and data URIs."""
+    made = []
+    for number, part in enumerate(report.tables, start=1):
+        text = io.StringIO()
+        csv.writer(text).writerows(part.plain())
+        encoded = base64.b64encode(text.getvalue().encode()).decode()
+        made.append((f"table-{number}.csv", f"data:text/csv;charset=utf-8;base64,{encoded}"))
+    return made
 
 
 def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:

@@ -11,9 +11,11 @@ from markupsafe import Markup
 from udd._util.small_units import small_unit
 from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
+from udd.plot.evidence import decreases
 from udd.plot.whiteness import shown_lags
 
 from . import wording
+from .loose_fit import loosest
 
 if TYPE_CHECKING:
     from udd.discovery.results import Discovery
@@ -54,6 +56,8 @@ def _rows(
     discovery: Discovery, wanted: Callable[[str], bool], share: tuple[str, float] = ("", 1.0)
 ) -> list[dict[str, str]]:
     known = units(discovery.fit)
+    # Numbers as of `udd fit`: their standard errors contain what the known model misses.
+    baseline = loosest(discovery.baseline).doubted() if discovery.effects else discovery.baseline
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
         unit, factor = small_unit(known[name]) if known[name] else share
@@ -61,7 +65,7 @@ def _rows(
             {
                 "name": wording.pretty(_base(name).split(".")[-1]),
                 "meaning": _meaning(_base(name), discovery) + _of_film(name),
-                "before": _value(discovery.baseline, name, factor),
+                "before": _value(baseline, name, factor),
                 "after": _value(discovery.fit, name, factor),
                 "unit": wording.pretty(unit),
             }
@@ -185,7 +189,7 @@ def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, st
     """The best of the curves that were tried."""
     scans = discovery.curves
     return [
-        {"title": c.title, "evidence": f"{c.evidence:.1f}".replace("-", "−"), "p": wording.probability(c.p)}
+        {"title": c.title, "evidence": wording.odds(c.evidence), "p": wording.probability(c.p)}
         for c in (scans[stage][:most] if stage < len(scans) else [])
     ]
 
@@ -195,13 +199,14 @@ def candidates(discovery: Discovery, stage: int, most: int = 12) -> list[dict[st
     rows = []
     found = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
+    fitted = decreases(discovery, stage)
     for s in discovery.scans[stage][:most] if stage < len(discovery.scans) else []:
         title = s.candidate.title
         rows.append(
             {
                 "title": title,
                 "equation": s.candidate.effect.equation,
-                "chi2": "–" if s.absorbed else f"{s.chi2:.1f}",
+                "chi2": "–" if s.absorbed else f"{fitted.get(title, s.chi2):.1f}",
                 "estimate": "–"
                 if s.absorbed
                 else Markup(", ").join(
