@@ -42,8 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 fine, 1 bad input, 130 on Ctrl-C, 141 where nobody reads the output. Wrong usage leaves by
-        ``SystemExit(2)``, as argparse does.
+        0 fine, 1 bad input, 3 a film was tracked but the result is doubtful, 130 on Ctrl-C, 141 where nobody
+        reads the output. Wrong usage leaves by ``SystemExit(2)``, as argparse does.
     """
     if argv is None:
         atexit.register(gc.freeze)  # a process that ends need not be searched for garbage: half a second

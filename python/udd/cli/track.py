@@ -21,6 +21,8 @@ from .output import CommandResult, shown_progress
 if TYPE_CHECKING:
     from udd.measurement import Measurement
 
+DOUBTFUL = 3  # exit code of a track that its own film makes doubtful
+
 
 def add(commands: Any) -> None:
     """Add the command."""
@@ -78,7 +80,11 @@ def add(commands: Any) -> None:
         "--bob", metavar="COLOUR", help="the film is one of a plain pendulum with a bob of this colour"
     )
     parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob [m]")
-    parser.add_argument("--fps", type=float, help="frames per second, where the film's header lies")
+    parser.add_argument(
+        "--fps",
+        metavar="RATE",
+        help="frames per second, if the header is wrong; 30,61:240,301:30 if it changes at these frames",
+    )
     parser.add_argument(
         "--config",
         type=Path,
@@ -176,14 +182,19 @@ def run(args: argparse.Namespace) -> CommandResult:
         data["page"] = args.page
     if args.out is not None:
         m.to_csv(args.out)
-        return CommandResult(f"{text}\nwritten: {args.out}", {**data, "file": args.out})
+        return CommandResult(f"{text}\nwritten: {args.out}", {**data, "file": args.out}, _code(m))
     if not args.json:
         with tempfile.TemporaryDirectory() as folder:
             table = Path(folder) / "table.csv"
             m.to_csv(table)
             sys.stdout.write(table.read_text(encoding="utf-8"))
         print(f"udd: {text}", file=sys.stderr)
-    return CommandResult("", data)
+    return CommandResult("", data, _code(m))
+
+
+def _code(m: Measurement) -> int:
+    """The exit code: 3 if the track is doubtful."""
+    return DOUBTFUL if m.meta.get("doubts") else 0
 
 
 def _check_source(args: argparse.Namespace) -> None:
@@ -263,7 +274,12 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         if len(place) != 2:
             raise UddError(f"--pivot must be two numbers U,V, not {args.pivot}")
         pivot = (place[0], place[1])
-    options = {"pivot": pivot, "mark_distance": args.mark_distance, "fps": args.fps, "scale": args.scale}
+    options: dict[str, Any] = {
+        "pivot": pivot,
+        "mark_distance": args.mark_distance,
+        "fps": _rates(args.fps),
+        "scale": args.scale,
+    }
     if args.region is not None:
         options["region"] = numbers([args.region], "--region")
     if args.calibrate is not None:
@@ -272,6 +288,19 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         _check_bob(args.bob)
     options |= {"bob": args.bob, "length": args.length}
     return {**options, "refine": False if args.fast else None, "config": args.config}
+
+
+def _rates(said: str | None) -> Any:
+    """From 240, or from 30,61:240,301:30."""
+    if said is None:
+        return None
+    rates = []
+    for k, part in enumerate(said.split(",")):
+        first, colon, rate = part.rpartition(":")
+        if bool(colon) != (k > 0):
+            raise UddError(f"--fps must be like 240, or 30,61:240,301:30 (from frame 61 on 240), not {said}")
+        rates.append((int(numbers([first], "--fps")[0]) if colon else 0, numbers([rate], "--fps")[0]))
+    return rates if len(rates) > 1 else rates[0][1]
 
 
 def _check_bob(colour: str) -> None:
@@ -335,7 +364,7 @@ def _folder(args: argparse.Namespace) -> CommandResult:
         raise UddError("say with --out in which folder the tables of the films are to be written")
     options = _options(args)
     args.out.mkdir(exist_ok=True)
-    lines, rows, failed = [], [], 0
+    lines, rows, failed, doubtful = [], [], 0, False
     for film in films:
         args.file = film
         try:
@@ -347,10 +376,12 @@ def _folder(args: argparse.Namespace) -> CommandResult:
             continue
         table = args.out / f"{film.stem}.csv"
         m.to_csv(table)
+        doubtful |= bool(m.meta.get("doubts"))
         text, data = _summary(m)
         drive = m.meta.get("drive_seen")
         lines.append(
             f"{film.name}: {text}" + (f"; drive {100 * drive:.3f} cm/s" if drive is not None else "")
         )
         rows.append({"film": film.name, "file": table, **data})
-    return CommandResult("\n".join(lines), {"films": rows, "failed": failed}, 1 if failed else 0)
+    code = 1 if failed else DOUBTFUL if doubtful else 0
+    return CommandResult("\n".join(lines), {"films": rows, "failed": failed}, code)

@@ -21,7 +21,7 @@ from .formats import HEAD, Table, format_of
 from .formats.headings import Heading
 from .input_signal import Hold
 from .recorded import Frames, Recorded, Units, own_inputs
-from .table import DISK, PENDULUM, QUALITY, Measurement, check_length
+from .table import CAMERA_COLUMNS, DISK, PENDULUM, QUALITY, Measurement, check_length
 from .unwrapping import unwrapped
 
 Columns = str | Sequence[str] | Mapping[str, str | tuple[str, str]]
@@ -307,7 +307,7 @@ def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, .
 def _quality(frames: Frames, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """What a tracked film's file says of each frame; in anybody else's the names may mean anything."""
     found: dict[str, NDArray[Any]] = {}
-    for name in (n for n in QUALITY if frames.has(n) and n not in names):
+    for name in (n for n in (*QUALITY, *CAMERA_COLUMNS) if frames.has(n) and n not in names):
         if name == "method":
             found[name] = frames.words(name)
         else:

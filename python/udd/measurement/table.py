@@ -27,7 +27,7 @@ PENDULUM = ("theta",)
 #: [rad] and enlargement, and its light relative to the steady picture.
 CAMERA_COLUMNS = ("camera_u", "camera_v", "camera_turn", "camera_zoom", "camera_gain")
 #: What a tracked film says of each frame.
-QUALITY = ("marks", "complete", "residual_px", "blur_px", "method", *CAMERA_COLUMNS)
+QUALITY = ("marks", "complete", "residual_px", "blur_px", "method")
 USABLE = ("gap", "degraded")  # flags of frames that hold what they show all the same
 SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
 

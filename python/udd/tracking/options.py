@@ -15,7 +15,7 @@ from udd._util.tables import table
 from udd.calibration_items import SWITCHES, Calibrate
 from udd.markers.layout import STANDARD, Layout, read_bob, read_layout
 from udd.markers.tags import Tag, is_tags, layout_of, read_tags
-from udd.video.reader import Picture, TrackError
+from udd.video.reader import Picture, Rates, TrackError, frame_rates
 
 Region = tuple[float, float, float, float]
 MarkSeparation = tuple[int, int, float]  # numbers of two marks, from 1, and their distance [m]
@@ -67,7 +67,7 @@ class TrackOptions:
 
     disk_radius: float = field(default=0.08, metadata=_told("a positive number of metres", "m"))
     mark_distance: float | None = field(default=None, metadata=_told("a positive number of metres", "m"))
-    fps: float | None = field(
+    fps: Rates | None = field(
         default=None, metadata=_told("a positive number of frames per second", "frames per second")
     )
     pivot: tuple[float, float] | None = field(
@@ -293,6 +293,10 @@ def _place(value: Any) -> tuple[float, float]:
     return _number(u), _number(v)
 
 
+def _rates(value: Any) -> Any:
+    return frame_rates(value) if isinstance(value, list | tuple) else positive(value)
+
+
 def _switch(value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise TypeError
@@ -311,7 +315,7 @@ def _layout(value: Any) -> Any:
 _READERS: dict[str, Callable[[Any], Any]] = {
     "disk_radius": positive,
     "mark_distance": positive,
-    "fps": positive,
+    "fps": _rates,
     "pivot": _place,
     "refine": _switch,
     "scale": positive,

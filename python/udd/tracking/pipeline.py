@@ -25,13 +25,17 @@ from udd.tracking.calibration.scale import scale as size_of
 from udd.tracking.correction import Correction, applied, correction_of
 from udd.tracking.detection.camera_motion import CameraMotion, camera_motion
 from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost, lost
-from udd.tracking.detection.recognition import recognise
+from udd.tracking.detection.recognition import placed, recognise
 from udd.tracking.detection.survey import Survey, survey
 from udd.tracking.geometry.pose import DiskAppearance, Pose
+from udd.tracking.metric.apparent_gravity import ApparentGravity, apparent_gravity
 from udd.tracking.metric.calibration_report import camera_of, meta_of
 from udd.tracking.metric.common_errors import common_mode_errors
+from udd.tracking.metric.doubts import doubts, quarter_turns
+from udd.tracking.metric.film_clock import slow_parts
 from udd.tracking.metric.pixels_to_metres import Camera, left_the_wheels, metres, recount
 from udd.tracking.metric.pose_covariance import add_shared_errors, covariance
+from udd.tracking.metric.turns import count_turns
 from udd.tracking.passes.first_pass import TrackerState, follow
 from udd.tracking.passes.frame_quality import quality, remarks
 from udd.tracking.passes.pendulum_bob import track_bob
@@ -69,7 +73,7 @@ def track(
     video: str | os.PathLike[str],
     *,
     disk_radius: float | None = None,
-    fps: float | None = None,
+    fps: float | Sequence[Sequence[float]] | None = None,
     pivot: tuple[float, float] | None = None,
     refine: bool | None = None,
     layout: Layout | Sequence[Mapping[str, Any]] | None = None,
@@ -89,8 +93,9 @@ def track(
         green (clockwise) near its rim, or with those of `layout`.
     disk_radius : float, optional
         Radius of the disk [m], 0.08 if not given; with the marks' distance it sets the scale.
-    fps : float, optional
-        Frames per second, where the film's header does not tell the truth (slow motion).
+    fps : float or sequence of (int, float), optional
+        Frames per second, if the film's header is wrong (slow motion), or pairs of a frame's number and the
+        rate from it on, the first frame being 0: ``[(0, 30), (61, 240), (301, 30)]``.
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
     refine : bool, optional
@@ -217,17 +222,66 @@ def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractCont
 def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
     """Coloured marks: survey, calibrate, follow, refine, to metres, flags."""
     look_over, camera = _steadied(film)
+    found = _measured(film, look_over, camera, options, progress, watch)
+    if _retimed(film, found):
+        found = _measured(film, survey(film), camera, options, progress, watch)
+    turns = quarter_turns(_gravity(found.measurement), found.camera)
+    if not turns:
+        return _with_doubts(film, found)
+    film.correct = applied(film).then_turned(turns)
+    film_is = "upside down" if turns == 2 else "on its side"
+    warnings.warn(f"{film.path}: the film is {film_is}; it is turned upright", stacklevel=outside())
+    options = placed(options, Correction(turns=turns), film.size)
+    return _with_doubts(film, _measured(film, survey(film), camera, options, progress, watch))
+
+
+def _retimed(film: Film, found: Tracking) -> bool:
+    """Whether parts of the film are slowed down, as the drive shows; its clock goes by the drive then."""
+    tracks = found.tracks
+    parts = [] if film.forced or film.slower else slow_parts(tracks.t, tracks.centre, tracks.angle)
+    if not parts:
+        return False
+    film.slower = tuple((float(tracks.t[part.first]), part.factor) for part in parts)
+    said = ", ".join(f"{p.factor:.3g} ± {p.sigma:.2g} from frame {p.first} on" for p in parts)
+    film.clock_note = f"times by the drive, which the film slows down by a factor of {said}"
+    warnings.warn(f"{film.path}: {film.clock_note}", stacklevel=outside())
+    return True
+
+
+def _gravity(m: Measurement) -> ApparentGravity | None:
+    return apparent_gravity(m.t, m.values, float(m.meta["R"]))
+
+
+def _with_doubts(film: Film, found: Tracking) -> Tracking:
+    """The same with what makes it doubtful in its header, which is also said as warnings."""
+    m, gravity = found.measurement, _gravity(found.measurement)
+    said = doubts(gravity, found.camera, film.fps, int(m.meta["turns_doubtful"]))
+    for doubt in said:
+        warnings.warn(f"{film.path}: {doubt}", stacklevel=outside())
+    shown = {} if gravity is None else {"gravity_seen": abs(gravity.value), "gravity_sigma": gravity.sigma}
+    return replace(found, measurement=m.with_meta(**shown, **({"doubts": said} if said else {})))
+
+
+def _measured(
+    film: Film,
+    look_over: Survey,
+    camera: CameraMotion | None,
+    options: TrackOptions,
+    progress: bool,
+    watch: Watch | None,
+) -> Tracking:
+    """One run over a film whose pictures are corrected as far as is known."""
     there = recognise(film, look_over, options)
     look_over, options = there.look_over, there.options
     known, rim = prepare(film, look_over, there.sights, there.seen, options, there.clear)
     tracks = _follow(film, known, look_over.frames, progress, watch)
     # where the contact was known the paths were curved, and poses stand in their middle
-    tracks, doubtful = _unwrap(tracks, known.exposure if known.contact is None else 0.0)
+    tracks = _unwrap(tracks, known.exposure if known.contact is None else 0.0)
     if options.refine:
         known = recalibrate(known, look_over, tracks, options)
         tracks = _refine(film, known, tracks, progress)
     tracks = drop_weak(tracks)
-    return _to_metres(film, tracks, known, options, rim, doubtful, options.refine, look_over, camera)
+    return _to_metres(film, tracks, known, options, rim, options.refine, look_over, camera)
 
 
 def _steadied(film: Film) -> tuple[Survey, CameraMotion | None]:
@@ -248,8 +302,7 @@ def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Wa
     with _bar(film, frames, "track", progress) as bar:
         tell = _teller(film, DiskAppearance([], 0.0, 1.0, film.light, np.inf), frames, bar, watch)
         tracks, known = follow_tags(film, film.pictures(), options, tell)
-    tracks, doubtful = _unwrap(tracks, known.exposure)
-    return _to_metres(film, tracks, known, options, None, doubtful, False)
+    return _with_doubts(film, _to_metres(film, _unwrap(tracks, known.exposure), known, options, None, False))
 
 
 def _teller(
@@ -265,13 +318,12 @@ def _teller(
     return tell
 
 
-def _unwrap(tracks: Tracks, open_for: float) -> tuple[Tracks, int]:
-    """Means over the exposure taken to its middle, whole turns counted; how many of these are in doubt."""
+def _unwrap(tracks: Tracks, open_for: float) -> Tracks:
+    """Means over the exposure taken to its middle, whole turns counted by the rates about gaps."""
     centre, angle = tracks.centre, tracks.angle
     if open_for:
         centre, angle = at_middle(tracks.t, centre, angle, open_for)
-    angle, doubtful = recount(tracks.t, angle)
-    return replace(tracks, centre=centre, angle=angle), doubtful
+    return replace(tracks, centre=centre, angle=recount(tracks.t, angle)[0])
 
 
 @dataclass(frozen=True)
@@ -292,7 +344,6 @@ def _to_metres(
     known: TrackerState,
     options: TrackOptions,
     rim: Rim | None,
-    doubtful: int,
     twice: bool,
     look_over: Survey | None = None,
     moved: CameraMotion | None = None,
@@ -303,6 +354,9 @@ def _to_metres(
         tracks = tracks.without(~moved.known[: len(tracks)], why)
     disk = _upright(film, tracks, known, options, rim, twice, look_over)
     tracks, camera = disk.tracks, disk.camera
+    drive = complex(np.conj(camera.drive)) * camera.scale
+    turns = count_turns(tracks.t, tracks.centre, tracks.angle, camera.pivot, drive, disk.known.look.reach)
+    tracks = replace(tracks, angle=turns.angle)
     # where the layout is taken as said, so is the centre
     by_hand = 0.0 if rim is not None and options.calibrate.layout else options.sigma.layout
     centre_sigma = by_hand * camera.scale
@@ -322,14 +376,17 @@ def _to_metres(
         table[gone | vague] = np.nan
     flags = [GONE if g else VAGUE if v else f for g, v, f in zip(gone, vague, tracks.flag, strict=True)]
     tracks = replace(tracks, flag=tuple(flags))
-    meta = meta_of(film, tracks, disk.known, camera, options, doubtful, disk.wobble)
+    meta = meta_of(film, tracks, disk.known, camera, options, len(turns.doubtful), disk.wobble)
     seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
     correct = applied(film)
     meta |= correct.meta
     seen_how |= {name: column[: len(tracks)] for name, column in correct.columns.items()}
     if moved is not None:
         meta |= moved.meta
-    tracks = replace(tracks, flag=tuple(remarks(tracks.t, tracks.flag, seen_how, twice)))
+    open_questions = [(int(k), "a whole turn may be missing") for k in turns.doubtful[:1]]
+    if camera.pivot_from == "support":
+        open_questions.append((0, "the contact is not determined"))
+    tracks = replace(tracks, flag=tuple(remarks(tracks.t, tracks.flag, seen_how, twice, open_questions)))
     m = Measurement(tracks.t, values, sigma, rho, np.array(tracks.flag), meta, DISK, seen_how)
     try:
         check_length(m)

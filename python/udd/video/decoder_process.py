@@ -50,7 +50,9 @@ def answer(path: str, request: str) -> None:
             said = facts(stream)
             stamps = array("q")
             if request == LOOK:
-                said["packets"], stamps = packets(container, stream)
+                said["packets"], outside, stamps = packets(container, stream)
+                said["frames"] = max(0, said["frames"] - outside)
+                said["capture_fps"] = capture_rate(container)
                 said |= {"stamps": len(stamps), "tick": float(stream.time_base or 0)}
             put(json.dumps(said).encode() + b"\n")
             if request == LOOK:
@@ -110,20 +112,34 @@ def facts(stream: Any) -> dict[str, Any]:
     }
 
 
-def packets(container: Any, stream: Any) -> tuple[int, array[int]]:
-    """How many coded frames the file holds, and their times in ticks from the first; none is decoded."""
+def capture_rate(container: Any) -> float | None:
+    """Frames per second at which an Android phone filmed in slow motion, by its tag."""
+    try:
+        rate = float(container.metadata.get("com.android.capture.fps", "nan"))
+    except ValueError:
+        return None
+    return rate if 0 < rate < math.inf else None
+
+
+def packets(container: Any, stream: Any) -> tuple[int, int, array[int]]:
+    """How many coded frames the file shows, how many lie outside its edit list, and the first ones' times.
+
+    Times are in ticks from the first. Nothing is decoded.
+    """
     import av
 
-    count, stamps, origin = 0, array("q"), stream.start_time or 0
+    count, outside, stamps, origin = 0, 0, array("q"), stream.start_time or 0
     try:
         for packet in container.demux(stream):
-            if packet.size > 0 and not packet.is_corrupt:
+            if packet.size > 0 and packet.is_discard:
+                outside += 1
+            elif packet.size > 0 and not packet.is_corrupt:
                 count += 1
                 if packet.pts is not None:
                     stamps.append(packet.pts - origin)
     except av.error.FFmpegError:
         pass  # cut off in the middle of one
-    return count, stamps
+    return count, outside, stamps
 
 
 def send(container: Any, stream: Any, since: float) -> None:

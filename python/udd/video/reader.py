@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,10 @@ from .decoder_process import HEAD, LOOK, NO_FILM
 from .srgb import light_of
 
 Plane = NDArray[np.uint8]
+Rates = float | Sequence[Sequence[float]]  # frames per second, or pairs of a frame and the rate from it on
 PATIENCE = 60.0  # s for which the decoder may be silent
 DECODER = str(Path(__file__).with_name("decoder_process.py"))
+SLOWED = 1.5  # times the header's rate: a film of a higher one was taken in slow motion
 MEMORY = 4 << 30  # bytes of address space that it may take
 
 
@@ -48,6 +51,58 @@ def light_of_codes(full_range: bool) -> NDArray[np.float64]:
     return np.asarray(255 * light_of(x))
 
 
+def frame_rates(said: Any) -> tuple[tuple[int, float], ...]:
+    """Read frames per second: a number, or pairs of a frame's number and the rate from it on.
+
+    Raises
+    ------
+    TrackError
+        It is something else.
+    """
+    if isinstance(said, int | float) and not isinstance(said, bool):
+        said = [(0, said)]
+    try:
+        pairs = tuple((int(first), float(rate)) for first, rate in said)
+        whole = all(int(first) == first for first, _ in said)
+    except (TypeError, ValueError, OverflowError):
+        pairs, whole = (), False
+    growing = all(a[0] < b[0] for a, b in pairwise(pairs))
+    good = all(math.isfinite(rate) and rate > 0 for _, rate in pairs)
+    if not (pairs and whole and growing and good and pairs[0][0] == 0):
+        raise TrackError(
+            f"fps must be positive and finite, or pairs [first frame, rate] from frame 0 on, not {said!r}"
+        )
+    return pairs
+
+
+def time_of(frame: int, rates: Sequence[tuple[int, float]]) -> float:
+    """The time [s] of a frame, at rates that hold from some frames on.
+
+    Examples
+    --------
+    >>> time_of(3, ((0, 1.0), (2, 4.0)))
+    2.25
+    """
+    time = 0.0
+    for (first, rate), (last, _) in pairwise([*rates, (frame, 1.0)]):
+        time += max(0, min(last, frame) - first) / rate
+    return time
+
+
+def real_time(t: float, slower: Sequence[tuple[float, float]]) -> float:
+    """The time [s] of what a clock shows that runs too slowly by factors, each from some time on.
+
+    Examples
+    --------
+    >>> real_time(3.0, ((0.0, 1.0), (2.0, 4.0)))
+    2.25
+    """
+    real = 0.0
+    for (begin, factor), end in zip(slower, [*(b for b, _ in slower[1:]), math.inf], strict=True):
+        real += max(0.0, min(t, end) - begin) / factor
+    return real
+
+
 class Film:
     """A film file that can be run through any number of times.
 
@@ -59,7 +114,7 @@ class Film:
     on memory, pixels and silence: a film that breaks it ends there, and is an error at worst.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, fps: float | None = None) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, fps: Rates | None = None) -> None:
         self.path = Path(path)
         if not self.path.exists():
             raise TrackError(f"{self.path}: there is no such file")
@@ -69,8 +124,7 @@ class Film:
             raise TrackError(f"{self.path} is a device or a pipe, not a regular file: save the film first")
         if self.path.stat().st_size == 0:
             raise TrackError(f"{self.path}: the file is empty")
-        if fps is not None and not (math.isfinite(fps) and fps > 0):
-            raise TrackError(f"fps must be positive and finite, not {fps!r}")
+        rates = None if fps is None else frame_rates(fps)
         if find_spec("av") is None:  # what decodes runs elsewhere, where nobody would be told
             raise ModuleNotFoundError("No module named 'av'", name="av")
         self.broken = 0  # packets that did not decode in the last run
@@ -84,13 +138,27 @@ class Film:
         self.promised = int(said["frames"])  # 0 where the container does not say
         self.packets = int(said["packets"])  # coded frames that the file holds
         self.size = (int(said["width"]), int(said["height"]))
-        self.forced = fps  # what the header says about time is not believed then
+        self.clock_note = ""  # where times come from, if not from the header alone
+        self.forced = rates  # what the header says about time is not believed then
         #: The constant rate that the container's times show, if it only rounded them; None else.
         self.clock = None if fps else steady_clock(np.unique(stamps) * said["tick"], said["tick"])
-        self.fps = float(fps or said["fps"] or (1 / self.clock.period if self.clock else math.nan))
+        fastest = max(rate for _, rate in rates) if rates else 0.0
+        self.fps = float(fastest or said["fps"] or (1 / self.clock.period if self.clock else math.nan))
         self.full_range = bool(said["full_range"])
         self.light = light_of_codes(self.full_range)  # of each brightness code
+        #: Times (begin, factor) by the header's clock from which on it runs so many times too slowly.
+        self.slower: tuple[tuple[float, float], ...] = ()
+        captured = said["capture_fps"]
+        if fps is None and captured and captured > SLOWED * self.fps:
+            self.slower = ((0.0, captured / self.fps),)
+            self.clock_note = f"times by the tag com.android.capture.fps: {captured:g} frames per second"
+            self.fps = float(captured)
         self.correct: Callable[[Picture], Picture] | None = None  # what is done to each picture
+
+    @property
+    def clock_text(self) -> str:
+        """Where the times come from, if they are not the container's own; empty if they are."""
+        return "; ".join(text for text in (self.clock.text if self.clock else "", self.clock_note) if text)
 
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
         """All frames that decode, in order of presentation, with increasing times.
@@ -98,7 +166,7 @@ class Film:
         Those from the last key frame up to `since` [s] on, where it is above 0; they are numbered from it.
         """
         self.broken = 0
-        if self.forced is not None:
+        if self.forced is not None or self.slower:
             since = 0.0  # the header's times are no help in seeking
         decoder = self._decoder()
         try:
@@ -107,10 +175,12 @@ class Film:
                 raise TrackError(f"{self.path} {said['error']}")
             for picture in decoder.pictures():
                 if self.forced is not None:
-                    picture = replace(picture, t=picture.index / self.forced)
+                    picture = replace(picture, t=time_of(picture.index, self.forced))
                 elif self.clock is not None:
                     # The halves of interlaced frames are half a period apart.
                     picture = replace(picture, t=self.clock.at(picture.t, parts=2))
+                if self.slower:
+                    picture = replace(picture, t=real_time(picture.t, self.slower))
                 yield picture if self.correct is None else self.correct(picture)
             self.broken = decoder.broken
         finally:

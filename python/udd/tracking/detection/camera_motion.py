@@ -17,7 +17,7 @@ from .survey import Survey
 
 Array = NDArray[np.float64]
 POINTS = 300  # of a picture that are tried
-LEARNED = 60  # pictures that show which of them belong to the background
+LEARNED = 40  # pictures that show which of them belong to the background
 OFTEN = 0.35  # share of these in which such a point goes with the others
 FEWEST = 10  # points that must go the same way
 SHARE = 0.25  # of all that can be followed that must
@@ -27,6 +27,7 @@ STEADY = 0.2  # pixels: a camera that moves less is at rest
 AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
 PATCH = 5  # pixels about a point whose light is compared
 WINDOW = 15  # pixels
+KNOWN = 0.8  # share of the pictures whose view is known; with less, the points are not the background's
 UNSURE = 0.06  # pixels: a view known no better is none
 UNLIKE = 0.03  # relative difference of light that is evened out before points are followed
 ZOOMS = tuple(1.12**k for k in (1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6))  # that are tried if all else fails
@@ -161,10 +162,11 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     background = Background(whole[0].y, film.light)
     if not background.learned(whole):
         return None
-    seen = background.follow(whole)
-    if not seen.known.any() or (seen.steady and seen.as_bright):
+    seen = background.follow(whole[::2])
+    if seen.known.mean() < KNOWN or (seen.steady and seen.as_bright):
         return None
-    return background.follow(film.pictures())
+    moved = background.follow(film.pictures())
+    return moved if moved.known.mean() >= KNOWN else None
 
 
 class _Seen(NamedTuple):

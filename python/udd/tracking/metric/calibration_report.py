@@ -70,14 +70,9 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOp
     guess = support(known.view)
     if guess is None:
         raise TrackError(
-            "the motion does not tell where the contact point is (the disk hardly turns, or turns steadily) "
+            "the motion does not determine the contact point (the disk hardly turns, or turns steadily) "
             "and no support is seen: give pivot=(u, v) in pixels"
         )
-    warnings.warn(
-        "the motion does not tell where the contact point is; it is taken from the support, to about "
-        f"{CLOSE_ENOUGH:.0f} mm",
-        stacklevel=outside(),
-    )
     return camera(complex(known.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
 
 
@@ -104,7 +99,7 @@ def meta_of(
         "source": film.path.name,
         "R": options.disk_radius,
         "fps": film.fps,
-        **({"clock": film.clock.text} if film.clock else {}),
+        **({"clock": film.clock_text} if film.clock_text else {}),
         "frames": len(tracks),
         "frames_missing": missing,
         "frames_lost": sum(flag != "" for flag in tracks.flag),

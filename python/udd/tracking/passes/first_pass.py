@@ -68,7 +68,8 @@ def follow(
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
         flag, fit, pose, motion = _track_frame(picture, known, past, last)
-        last = picture.y
+        # a disk that is not seen, as behind a hand, does not move: no copy is recognised by it
+        last = picture.y if flag in ("", REPEATED) else None
         streak = known.look.streak(motion)
         if fit is None:
             frames.append(lost_in(picture.t, flag, streak, len(known.look.marks)))

@@ -33,9 +33,16 @@ def quality(tracks: Tracks, given: NDArray[np.bool_]) -> dict[str, NDArray[Any]]
 
 
 def remarks(
-    t: NDArray[np.float64], flags: Sequence[str], table: dict[str, NDArray[Any]], twice: bool
+    t: NDArray[np.float64],
+    flags: Sequence[str],
+    table: dict[str, NDArray[Any]],
+    twice: bool,
+    since: Sequence[tuple[int, str]] = (),
 ) -> list[str]:
-    """The flags, with `gap` and `degraded` where a frame holds a pose; `twice`: of two passes."""
+    """The flags, with `gap` and `degraded` where a frame holds a pose; `twice`: of two passes.
+
+    `since`: numbers of frames from which on all are in doubt, and why.
+    """
     missing = missing_before(t)
     enough = min(ENOUGH, int(table["marks"].max(initial=0)))
     said = []
@@ -50,6 +57,8 @@ def remarks(
             said.append("degraded: the second pass did not hold it")
         else:
             said.append("")
+    for first, why in since:
+        said[first:] = [f"degraded: {why}" if flag == "" else flag for flag in said[first:]]
     return said
 
 

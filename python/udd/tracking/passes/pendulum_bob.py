@@ -269,7 +269,7 @@ def _angles(
     meta: dict[str, Any] = {
         "source": film.path.name,
         "fps": film.fps,
-        **({"clock": film.clock.text} if film.clock else {}),
+        **({"clock": film.clock_text} if film.clock_text else {}),
         "frames": len(t),
         "frames_missing": max(0, film.promised - len(t)),
         "frames_lost": int((~seen).sum()),

@@ -1,0 +1,153 @@
+"""Whole turns across gaps: the one that rolling and usual torques explain, or a doubt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+Array = NDArray[np.float64]
+SHORT = 3.5  # usual intervals: in a shorter gap no turn is lost
+SIDE, NEAR = 4, 0.12  # frames, and seconds, on each side that show the rate of turning
+STEP = 0.08  # s over which accelerations are compared; shorter ones are noise
+MEMORY = 0.15  # s for which an acceleration lasts, about
+SURE = 16.0  # decrease of chi2 against the next best number of turns
+ODD = 12.0  # chi2 for each acceleration beyond which none explains the gap
+PLACE, SLIP = 0.01, 0.04  # of the marks' reach, of the way driven: by how much a disk may miss its place
+SHAPES = 4  # by which the angle may differ from a cubic
+SAMPLES = 25
+LONG = 1.0  # s: across a longer gap too many ways are as good
+MOST = 12  # turns more or less that are tried
+LEAST = 3.0  # rad/s^2: no disk turns more evenly
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Angles with their whole turns, and the frames from which on their number is in doubt."""
+
+    angle: Array
+    doubtful: NDArray[np.intp]
+
+
+def count_turns(
+    t: Array, centre: NDArray[np.complex128], angle: Array, pivot: complex, drive: complex, reach: float
+) -> Turns:
+    """Find the whole turns in each gap.
+
+    A frame shows the angle but for whole turns. For each number of these the smoothest way of the angle is
+    found that also takes the centre where it is seen again: a disk that rolls about `pivot` keeps
+    (c - p) exp(-i angle) - d integral exp(-i angle) dt. Its accelerations, against those that the disk has
+    where it is seen, say how well that number does.
+
+    Parameters
+    ----------
+    t : ndarray (n,)
+        Times, s.
+    centre : ndarray of complex (n,)
+        Pixels.
+    angle : ndarray (n,)
+        rad; NaN where the disk was not seen.
+    pivot, drive : complex
+        Contact [pixels] and velocity of the drive [pixels/s]; NaN if they are not known.
+    reach : float
+        Distance of the marks from the centre [pixels].
+    """
+    angle, doubtful = angle.copy(), []
+    seen = np.flatnonzero(np.isfinite(angle))
+    if len(seen) < 2 * SIDE:
+        return Turns(angle, np.empty(0, np.intp))
+    usual, fastest = _usual_acceleration(t, angle), _fastest(t, angle)
+    gaps = np.flatnonzero(np.diff(t[seen]) > SHORT * float(np.median(np.diff(t))))
+    for k in gaps:
+        i, j = seen[k], seen[k + 1]
+        before, after = _rate(t, angle, seen[: k + 1], i), _rate(t, angle, seen[k + 1 :], j)
+        if not np.isfinite(before + after):
+            doubtful.append(j)
+            continue
+        gap, expected = t[j] - t[i], 0.5 * (before + after) * (t[j] - t[i])
+        first = (angle[i] - angle[j] + expected) / (2 * np.pi)
+        tries = [n for n in range(round(first) - MOST, round(first) + MOST + 1)
+                 if abs(angle[j] - angle[i] + 2 * np.pi * n) <= 1.3 * fastest * gap + np.pi]  # fmt: skip
+        way = _Way(
+            gap, before, after, usual, (centre[i] - pivot) / reach, (centre[j] - pivot) / reach, drive / reach
+        )
+        costs = np.array([way.cost(angle[i], angle[j] + 2 * np.pi * n) for n in tries])
+        best = int(np.argmin(costs))
+        others = np.delete(costs, best)
+        odd = costs[best] > ODD * way.pieces
+        if odd or gap > LONG or (len(others) and others.min() - costs[best] < SURE):
+            doubtful.append(j)
+        angle[j:] += 2 * np.pi * tries[best]
+    return Turns(angle, np.array(doubtful, dtype=np.intp))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """What is known about a gap: its length, the rates on both sides, the centre before and after."""
+
+    gap: float
+    before: float
+    after: float
+    usual: float  # acceleration [rad/s^2]
+    start: complex  # of the centre from the contact, in units of the marks' reach
+    end: complex
+    drive: complex
+
+    @property
+    def pieces(self) -> float:
+        """How many accelerations follow each other in the gap."""
+        return 1 + self.gap / MEMORY
+
+    def cost(self, start: float, end: float) -> float:
+        """Chi2 of the smoothest way from one angle to the other."""
+        s = np.linspace(0, 1, SAMPLES)
+        rise, a, b = end - start, self.before * self.gap, self.after * self.gap
+        cubic = np.polynomial.Polynomial([start, a, 3 * rise - 2 * a - b, a + b - 2 * rise])
+        flat = np.polynomial.Polynomial([0, 0, 1, -2, 1])  # s^2 (1 - s)^2
+        shapes = [flat * np.polynomial.Chebyshev.basis(k, [0, 1]).convert(kind=np.polynomial.Polynomial)
+                  for k in range(SHAPES)]  # fmt: skip
+        places, bends = np.array([f(s) for f in shapes]), np.array([f.deriv(2)(s) for f in shapes])
+        base, bend = cubic(s), cubic.deriv(2)(s)
+        factor = np.sqrt(self.pieces / SAMPLES) / (self.usual * self.gap**2)
+        rolls = np.isfinite(self.start) and np.isfinite(self.drive)
+        spread = np.hypot(PLACE, SLIP * abs(self.drive) * self.gap) if rolls else 1.0
+
+        def rest(x: Array) -> Array:
+            out: Array = np.asarray(factor * (bend + x @ bends))
+            if not rolls:
+                return out
+            turn = np.exp(-1j * (base + x @ places - start))
+            swept = np.trapezoid(turn, s) * self.gap
+            off = (self.end * turn[-1] - self.start - self.drive * swept) / spread
+            return np.append(out, [off.real, off.imag])
+
+        return float(2 * least_squares(rest, np.zeros(SHAPES), max_nfev=40).cost)
+
+
+def _rate(t: Array, angle: Array, seen: NDArray[np.intp], edge: int) -> float:
+    """Rate of turning at a frame at the edge of a gap, by a parabola through those about it."""
+    usual = float(np.median(np.diff(t)))
+    rows = seen[np.abs(t[seen] - t[edge]) < max((SIDE - 0.5) * usual, NEAR)]
+    if len(rows) < 2:
+        return float("nan")
+    x = t[rows] - t[edge]
+    return float(np.polyfit(x, angle[rows], min(2, len(rows) - 1))[-2])
+
+
+def _usual_acceleration(t: Array, angle: Array) -> float:
+    """Root mean square of the angular acceleration where the disk is seen, over steps of `STEP`."""
+    step = max(1, round(STEP / float(np.median(np.diff(t)))))
+    h = step * float(np.median(np.diff(t)))
+    second = angle[2 * step :] - 2 * angle[step:-step] + angle[: -2 * step]
+    even = np.abs(t[2 * step :] - t[: -2 * step] - 2 * h) < 0.3 * h
+    good = second[np.isfinite(second) & even]
+    return max(float(np.sqrt(np.mean(good**2))) / h**2, LEAST) if len(good) else 30.0
+
+
+def _fastest(t: Array, angle: Array) -> float:
+    """Nearly the fastest rate at which the disk is seen to turn."""
+    rate = np.abs(np.diff(angle) / np.diff(t))
+    near = np.isfinite(rate) & (np.diff(t) < SHORT * float(np.median(np.diff(t))))
+    return float(np.quantile(rate[near], 0.99)) if near.any() else 20.0
