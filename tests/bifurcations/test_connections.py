@@ -110,3 +110,10 @@ def test_where_there_can_be_none() -> None:
     orbit = udd.periodic_orbit(udd.Model(["x", "v"], ["v", "-sin(x)"]), [1.0, 0.0])
     with pytest.raises(ModelError, match="over a parameter of the model, not over period"):
         udd.connection(udd.continuation(orbit, "period", (6.6, 7.0)))
+
+
+def test_a_jerk_equation_has_its_homoclinic_orbit_by_default() -> None:
+    model = udd.Model(["x", "v", "a"], ["v", "a", "-a - 0.4*v + mu*x*(1 - x)"], {"mu": 0.7})
+    (one,) = udd.connections(model, "mu", (0.735, 0.745), n=2)
+    # To 36 digits by a Taylor method.
+    assert one.kind == "homoclinic" and abs(one.value - 0.7398598229327773) <= one.error < 1e-11

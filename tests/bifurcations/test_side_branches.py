@@ -31,6 +31,15 @@ def test_a_side_branch_has_its_pitchfork_among_its_points(name: str) -> None:
     assert len(other) > 3 and np.ptp(other.values) > 0.5
 
 
+@pytest.mark.parametrize("start", [0.61, 0.7, 1.37])
+def test_a_pitchfork_has_a_bound_wherever_the_branch_starts(start: float) -> None:
+    model = udd.Model(["x"], ["(r - 0.6)*x - x^3"], {"r": start})
+    side = max(udd.equilibria(model), key=lambda rest: float(rest.state[0]))
+    for bounds in ((0.0, 3.0), (0.5, 2.5), (0.0, np.inf)):
+        (point,) = udd.continuation(side, "r", bounds, direction="down").points
+        assert abs(point.value - 0.6) <= point.error < 1e-12
+
+
 def test_a_stirred_reactor_has_its_folds_and_hopf_points() -> None:
     # Uppal, Ray and Poore's reactor; values from its trace and determinant, by Brent's method.
     model = udd.Model(

@@ -30,7 +30,7 @@ def dataset(
     dims: Sequence[str],
     units: Mapping[str, str],
     coords: Mapping[str, NDArray[Any]],
-    **attrs: str,
+    **attrs: Any,
 ) -> xr.Dataset:
     """Columns of one shape, each with its unit where it has one.
 

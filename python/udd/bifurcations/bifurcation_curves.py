@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import optimize
@@ -11,6 +12,7 @@ from scipy import optimize
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.keywords import renamed
+from udd._util.labelled import of_states
 from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
 
@@ -31,6 +33,9 @@ from .pseudo_arclength import CorrectorFailed
 from .shooting_curve import PeriodicOrbitCurve
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Locus", "locus"]
 
@@ -75,6 +80,28 @@ class Locus(Drawable):
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The curve as labelled arrays over ``place``: both parameters, every state and the coefficients.
+
+        Returns
+        -------
+        xarray.Dataset
+            Its special points are those of the dimension ``special``.
+        """
+        rests = [one.equilibrium if isinstance(one, Connection) else one for one in self.solutions]
+        model = rests[0].model
+        states, special = np.array([rest.state for rest in rests]), np.zeros((0, 2))
+        if self.points:
+            special = np.array([point.values for point in self.points])
+        found = of_states(model.state_names, model.state_units, states, ["place"], {}, kind=self.kind)
+        columns = {name: ("place", self.values[:, k]) for k, name in enumerate(self.parameters)}
+        columns |= {f"special_{name}": ("special", special[:, k]) for k, name in enumerate(self.parameters)}
+        columns |= {
+            "frequency": ("place", self.frequencies),
+            "lyapunov_coefficient": ("place", self.lyapunov_coefficients),
+        }
+        return found.assign_coords(special=[point.kind for point in self.points]).assign(columns)
 
     def __repr__(self) -> str:
         (a, b), (p, q) = self.values[[0, -1]], self.parameters

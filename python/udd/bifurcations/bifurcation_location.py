@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy import optimize
@@ -29,7 +31,8 @@ __all__ = [
 
 _TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
 _STILL = 1e-5  # a tangent with less of the parameter
-_NODES = 12  # points of a curve about a pitchfork
+_NODES = 12  # points of a curve about a pitchfork,
+_ENOUGH = 8  # of which so many at least
 _SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
 _NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
 _SURE = 2.0  # and how far beyond the largest scatter the error may lie
@@ -122,7 +125,11 @@ def turning(
             place = CurvePoint(u, tangent_at(curve, u, a.tangent))
         except CorrectorFailed:
             break
-        sigma, fold = middle, test_functions_at(curve, place).fold
+        fold = test_functions_at(curve, place).fold
+        if abs(fold) > max(abs(before.fold), abs(after.fold)):
+            # On the other branch: the equations are singular here, and this is the place.
+            return middle, CurvePoint(a.u + middle * a.tangent, a.tangent)
+        sigma = middle
         if fold * low[1] > 0.0:
             low = (middle, fold)
         else:
@@ -152,8 +159,17 @@ def pitchfork_at(
     """
     width = 0.5 * step
     distances = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    points = [newton_corrector(curve, a.u + (sigma + width * x) * a.tangent, a.tangent) for x in distances]
-    fits = [_turning_of(distances, np.array(points), degree) for degree in (_NODES - 2, _NODES - 1)]
+    points: list[Floats] = []
+    where: list[float] = []
+    for x in distances.tolist():
+        # Too near to the pitchfork itself Newton's method fails: the others do.
+        with suppress(CorrectorFailed):
+            points.append(newton_corrector(curve, a.u + (sigma + width * x) * a.tangent, a.tangent))
+            where.append(x)
+    many = len(points)
+    if many < _ENOUGH:
+        raise CorrectorFailed("the curve cannot be followed about the pitchfork")
+    fits = [_turning_of(np.array(where), np.array(points), degree) for degree in (many - 2, many - 1)]
     (_, before, _), (x, u, along) = fits
     error = abs(float(u[-1] - before[-1])) * curve.scale + float(rounding_of(curve.value(u)))
     return sigma + width * x, CurvePoint(u, along / np.linalg.norm(along)), error

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.drawable import Drawable
+from udd._util.labelled import of_states
 from udd.errors import ModelError
 from udd.models import Model
 
@@ -18,6 +19,9 @@ from .flow_map import Floats
 from .pseudo_arclength import CurvePoint
 from .shooting_curve import HELD, PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["AnyCurve", "BifurcationPoint", "Branch", "cycles_of"]
 
@@ -73,6 +77,16 @@ class BifurcationPoint(Drawable):
         if isinstance(self.solution, PeriodicOrbit):
             return self.solution.period
         return 2.0 * np.pi / self.frequency
+
+    @cached_property
+    def lyapunov_error(self) -> float:
+        """A bound of the error of the first Lyapunov coefficient; NaN of what is no Hopf bifurcation."""
+        from .branch_solutions import lyapunov_error_of
+
+        curve, place = self._curve, self._place
+        if self.kind != "Hopf" or not isinstance(curve, EquilibriumCurve) or place is None:
+            return float("nan")
+        return lyapunov_error_of(curve, place, self.error)
 
     @property
     def criticality(self) -> str:
@@ -181,6 +195,37 @@ class Branch(Drawable):
         from .branch_solutions import solutions_at
 
         return solutions_at(self._places, self.values, value)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The branch as labelled arrays over ``place``: every state, the parameter, periods and multipliers.
+
+        Returns
+        -------
+        xarray.Dataset
+            The bifurcation points are those of the dimension ``bifurcation``.
+
+        Examples
+        --------
+        >>> import udd
+        >>> rest = udd.equilibria(udd.Model(["x"], ["r - x^2"], {"r": 1.0}))[0]
+        >>> table = udd.continuation(rest, "r", (-1.0, 2.0)).to_xarray()
+        >>> print(table.bifurcation.values, table.bifurcation_value.values.round(9) + 0.0)
+        ['fold'] [0.]
+        """
+        model, points = self.model, self.points
+        attrs = {"model": repr(model), "parameter": self.parameter, "kind": self.kind}
+        found = of_states(model.state_names, model.state_units, self.states, ["place"], {}, **attrs)
+        return found.assign_coords(bifurcation=[point.kind for point in points]).assign(
+            {
+                self.parameter: ("place", self.values),
+                "period": ("place", self.periods),
+                "stable": ("place", self.stable),
+                "arclength": ("place", self.arclength),
+                "multiplier": (("place", "number"), self.multipliers),
+                "bifurcation_value": ("bifurcation", np.array([point.value for point in points])),
+                "bifurcation_error": ("bifurcation", np.array([point.error for point in points])),
+            }
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """The branch as plain numbers, for JSON."""

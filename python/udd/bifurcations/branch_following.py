@@ -37,6 +37,7 @@ _WATCHED = 6  # points in which a branch shows that it comes to a connection,
 _CONVERGED = 1e-11  # by this relative change of its parameter
 _GROWN = 1.005  # while the period grows by this factor
 _LOOP = 8  # points at least of a closed branch
+_NEARER = (1.0, 0.5, 0.2, 0.1, 0.05)  # parts of a step, within which a pitchfork is located
 _ASIDE = 1e-9  # from a corner, in scaled unknowns
 _SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
 _SMALL = 0.1  # typical sizes: where no smaller orbit is found, this one may have come from a Hopf bifurcation
@@ -210,9 +211,11 @@ def _record_origin(
         way.end = f"a {point.kind} at {point.value:.10g}"
         return
     error = float("nan")
-    # If the curve cannot be followed about it, the place is less accurate.
-    with suppress(CorrectorFailed, IntegrationError):
-        sigma, place, error = pitchfork_at(curve, here, gone, sigma)
+    # If the curve cannot be followed about it, not even nearer, the place is less accurate.
+    for part in _NEARER:
+        with suppress(CorrectorFailed, IntegrationError):
+            sigma, place, error = pitchfork_at(curve, here, part * gone, sigma)
+            break
     signs, errors = test_functions_at(curve, place), (error, float("nan"))
     _record_point(curve, place, signs, "branch point", errors, way, limits, arclength + sigma)
     way.end = f"a branch point at {curve.value(place.u):.10g}"

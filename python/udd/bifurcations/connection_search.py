@@ -106,7 +106,7 @@ def connections(
         At so many values, equally far apart, the manifolds are compared at first.
     t_max : float, optional
         Connections are looked for that come near the equilibrium at their end within this time after they
-        have left the one at their beginning, by default 10 typical times.
+        have left the one at their beginning, by default 20 typical times.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def connections(
     there = equilibria(start)
     flow = flow_of(start, _extent(start, [rest.state for rest in there]))
     index = flow.index(parameter)
-    span = number("t_max", 10.0 * flow.clock if t_max is None else t_max, above=0.0)
+    span = number("t_max", 20.0 * flow.clock if t_max is None else t_max, above=0.0)
     rests = [flow.reduced(rest.state) for rest in there]
     found: list[Connection] = []
     followed, whole_search = 0, True

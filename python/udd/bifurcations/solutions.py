@@ -140,6 +140,20 @@ class PeriodicOrbit(Drawable):
         """Whether all multipliers are inside the unit circle, and not on it but for rounding."""
         return bool((np.abs(self.multipliers) < 1.0 - _ON).all())
 
+    @cached_property
+    def multiplier_errors(self) -> Floats:
+        """Bounds of the errors of the multipliers, to first order; NaN if their curve is not known."""
+        from .floquet_multipliers import multipliers_at
+
+        if self._curve is None or self._unknowns is None:
+            return np.full(len(self.multipliers), np.nan)
+        found = multipliers_at(self._curve, self._unknowns)
+        # A symmetric cycle's are the squares of those of half a round.
+        rounds = 2.0 if self.symmetric else 1.0
+        sizes = np.abs(found.values) ** rounds
+        errors: Floats = (rounds * sizes * found.error)[np.argsort(-sizes, kind="stable")]
+        return errors
+
     @property
     def neutral(self) -> bool:
         """Whether no multiplier is outside the unit circle, and one on it but for rounding."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
+from udd._util.labelled import dataset
 from udd._util.memory import require_memory
 from udd._util.one_line import OneLine
 from udd._util.validation import number, whole
@@ -28,6 +29,8 @@ from .fate import Fate, Orbit
 from .largest_exponent import LOOK, reason, span
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from .poincare_sections import Section
 
 __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
@@ -96,6 +99,19 @@ class Spectrum(Drawable):
     converged: bool
     model: Model
     section: Section | None = None
+
+    def to_xarray(self) -> xr.Dataset:
+        """The exponents with their standard errors over ``number``, and all the rest as attributes.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
+        numbers = {"number": np.arange(1, len(self.exponents) + 1)}
+        columns = {"exponent": self.exponents, "standard_error": self.standard_errors}
+        attrs: dict[str, Any] = {"model": repr(self.model), "verdict": self.verdict}
+        attrs |= {"dimension": self.dimension, "period": self.period, "t": self.t, **self.invariants}
+        return dataset(columns, ["number"], {}, numbers, **attrs)
 
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.standard_errors, strict=True)
