@@ -31,3 +31,8 @@ def test_every_page_is_in_the_table_of_contents() -> None:
     index = (DOCS / "index.md").read_text(encoding="utf-8")
     for page in DOCS.glob("*.md"):
         assert page.stem == "index" or f"\n{page.stem}\n" in index
+
+
+def test_the_gallery_has_every_plot_function() -> None:
+    shown = set(re.findall(r"udd\.plot\.(\w+)\(", (DOCS / "pictures.md").read_text(encoding="utf-8")))
+    assert shown == set(udd.plot.__all__)

@@ -63,7 +63,7 @@ class Motion:
     def is_own(self) -> bool:
         """Whether the columns are states or sensors of the user's own model."""
         written = isinstance(self.model, Model) and self.model.profile.written
-        return written or not any(set(cls.state_names) & set(self.columns) for cls in COMPILED.values())
+        return written or not self._drawn
 
     @property
     def series(self) -> tuple[str, ...]:
@@ -94,10 +94,15 @@ class Motion:
 
     @property
     def _class(self) -> type[Model]:
-        """The model whose last column in pictures is there, or all of whose states are."""
-        there = set(self.columns)
-        drawn = [c for c in COMPILED.values() if set(c.profile.shown.columns[-1:] or c.state_names) <= there]
+        """The model whose columns these are."""
+        drawn = self._drawn
         return next((cls for cls in drawn if isinstance(self.model, cls)), drawn[0] if drawn else DLE)
+
+    @property
+    def _drawn(self) -> list[type[Model]]:
+        """The models whose last column in pictures is there, or all of whose states are."""
+        there = set(self.columns)
+        return [c for c in COMPILED.values() if set(c.profile.shown.columns[-1:] or c.state_names) <= there]
 
     def __getitem__(self, name: str) -> Array:
         try:
