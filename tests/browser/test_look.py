@@ -77,3 +77,22 @@ def test_a_diagram_has_first_pixels_soon_and_is_kept(opened: Opened) -> None:
     page.click("#tab-section")
     page.click("#tab-diagram")
     assert page.evaluate("udd.diagram.working") is False
+
+
+def test_the_tour_has_six_steps_with_aims_and_questions(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#tour-begin")
+    for k in range(6):
+        assert page.locator("#tour-title").text_content().startswith(f"{k + 1} of 6: ")
+        assert page.locator("#tour-question").text_content().endswith("?")
+        if k == 3:
+            assert page.is_checked("#twin")
+        page.click("#tour-next")
+    assert page.locator("#tour").is_hidden() and page.locator("#film").is_visible()
+
+
+def test_the_film_tab_is_kept_over_a_reload(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#to-film")
+    page.reload()
+    until(page, "globalThis.udd && !document.getElementById('film').hidden")

@@ -35,6 +35,8 @@ def run(args: argparse.Namespace) -> CommandResult:
     from udd.report import as_text, summary_of
 
     made = demo(args.out, null=args.null, progress=shown_progress())
-    text = f"{as_text(summary_of(made.discovery))}\nmeasurement: {made.measurement}\nreport: {made.report}"
+    rendered = "This film was rendered from a simulated disk, not filmed."
+    verdict = as_text(summary_of(made.discovery))
+    text = f"{verdict}\n{rendered}\nmeasurement: {made.measurement}\nreport: {made.report}"
     data = {"measurement": made.measurement, "report": made.report, **made.discovery.to_dict()}
     return CommandResult(text, data)

@@ -224,8 +224,8 @@ def whiteness(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[P
     """Whether the innovations are white noise."""
     title = "Are the surprises white noise?"
     columns = {
-        "name": Column("", names=True),
-        "model": Column(""),
+        "name": Column("channel", names=True),
+        "model": Column("model"),
         "square": Column("mean square", number=True),
         "largest": Column("largest autocorrelation", number=True),
         "p": Column("Ljung–Box: probability for white noise", number=True),
@@ -308,7 +308,7 @@ def _round(discovery: Discovery, stage: int) -> tuple[Part, ...]:
         "equation": Column("equation"),
         "chi2": Column("decrease in χ²", number=True),
         "estimate": Column("estimate"),
-        "said": Column(""),
+        "said": Column("remark"),
     }
     told = [{**row, "equation": pretty(row["equation"])} for row in rows]
     best = replace(
@@ -363,7 +363,7 @@ def _limits(discovery: Discovery) -> Section:
 
 def _numbers(discovery: Discovery, one: Discovery) -> Section:
     columns = {
-        "name": Column("", names=True),
+        "name": Column("symbol", names=True),
         "meaning": Column("what it is"),
         "before": Column(BEFORE, number=True),
         "after": Column(AFTER, number=True),
@@ -384,7 +384,7 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
         f"effect.{bends}"
     )
     noise = {
-        "name": Column("", names=True),
+        "name": Column("symbol", names=True),
         "found": Column("standard deviation at rest", number=True),
         "growth": Column("grows with the speed by", number=True),
         "stated": Column(tables.noise_beforehand(discovery.fit), number=True),

@@ -143,7 +143,7 @@ def others(discovery: Discovery) -> Section:
 
 def _numbers(discovery: Discovery) -> Section:
     columns = {
-        "name": Column("", names=True),
+        "name": Column("symbol", names=True),
         "before": Column(BEFORE, number=True),
         "after": Column("with what was added", number=True),
     }

@@ -100,7 +100,7 @@ def _calibrated(m: Measurement) -> Section:
         "positions; what was said by hand is “given”."
     )
     columns = {
-        "name": Column("", names=True),
+        "name": Column("item", names=True),
         "value": Column("value", number=True),
         "error": Column("standard error", number=True),
         "unit": Column("unit"),

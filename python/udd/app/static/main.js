@@ -13,6 +13,7 @@ import { PhaseView, PlaneView } from "./phase.js";
 import { Player } from "./player.js";
 import { Sections } from "./sections.js";
 import * as texts from "./texts.js";
+import { Tour } from "./tour.js";
 import { Trail } from "./trail.js";
 import { What } from "./what.js";
 
@@ -48,6 +49,7 @@ class Page {
     });
     this.controls();
     this.fromAddress(true);
+    this.tour = new Tour(this.tourSteps());
     addEventListener("hashchange", () => this.fromAddress(false));
     requestAnimationFrame((now) => this.frame(now));
   }
@@ -135,6 +137,27 @@ class Page {
     this.play(true);
   }
 
+  /** What the page shows at each step of the tour. */
+  tourSteps() {
+    const show = (W, twin, tab, state = [0, 0.001, 0.04, 0]) => () => {
+      this.page($("to-explore"));
+      this.showMap($(`tab-${tab}`));
+      $("twin").checked = twin;
+      const { model } = structuredClone(this.catalogue.presets[0]);
+      this.panel.preset("");
+      this.begin({ ...model, W }, state);
+      this.play(true);
+    };
+    return [
+      show(0, false, "what"),
+      show(0.014, false, "energy"),
+      show(0.03, false, "section"),
+      show(0.03, true, "section"),
+      show(0.03, false, "diagram"),
+      () => this.page($("to-film")),
+    ];
+  }
+
   // --- the address
 
   toAddress() {
@@ -193,7 +216,7 @@ class Page {
       if (this.home) this.toAddress();
     });
     this.page = tabs([$("to-explore"), $("to-film")], (id) => remember("page", id));
-    this.page($(recalled("page") === "to-film" && !location.hash ? "to-film" : "to-explore"));
+    this.page($(recalled("page") === "to-film" ? "to-film" : "to-explore"));
     this.showMap($("tab-section"));
     this.setSpeed(1);
     this.play(!this.still);
