@@ -96,3 +96,21 @@ def test_a_disk_at_rest_is_measured(tmp_path: Path) -> None:
     film = udd.render(Rest(), tmp_path / "rest.mp4", size=SMALL)
     m = udd.track(film.path, pivot=film.pivot)
     assert np.nanmax(np.abs(errors(m, film)[:, :2])) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("view", "defects", "limit"),
+    [
+        ({"size": (118, 150)}, {}, 0.1),  # a disk of 60 pixels
+        ({"size": (320, 240)}, {}, 0.1),
+        ({}, {"gains": ((0.0, 0.12),)}, 0.05),
+    ],
+)
+def test_small_and_dim_films_are_measured(view: Any, defects: Any, limit: float, tmp_path: Path) -> None:
+    """They were refused, as having no scale, even if the scale was given."""
+    film = shot(tmp_path / "small.mp4", defects=Defects(**defects), **view)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        m = udd.track(film.path)
+    e = rms(errors(m, film))
+    assert e[0] < limit and e[1] < limit and m.seen.all()

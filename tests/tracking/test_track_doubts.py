@@ -16,6 +16,7 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 import av
 
 import udd
+import udd.tracking
 from small_films import shot
 from tracked_errors import errors, rms
 from udd.cli import main
@@ -129,6 +130,8 @@ def test_a_wrong_clock_is_a_doubt_and_an_exit_code(tmp_path: Path, capsys: Any) 
     assert "times too long" in capsys.readouterr().err
     back = udd.read_measurement(table)
     assert "gravity is" in back.meta["doubts"][0] and float(back.meta["gravity_seen"]) > 100
+    udd.tracking.page(film.path, back, tmp_path / "page.html")
+    assert "times too long" in (tmp_path / "page.html").read_text(encoding="utf-8")
     assert main(["track", str(film.path), "--out", str(table)]) == 0
 
 

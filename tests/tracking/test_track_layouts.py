@@ -215,3 +215,23 @@ def test_a_pendulum_that_is_not_there(clock: Callable[[float], float], tmp_path:
     film = write(tmp_path / "bob.mp4", [swinging(clock, k / FPS, 0.0, rng) for k in range(30)])
     with pytest.raises(TrackError, match="no bob of that colour moves"):
         udd.track(film, bob="blue")
+
+
+def test_a_bob_that_grows_in_the_light_is_not_lost(clock: Callable[[float], float], tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    sizes = [13 * (1 + 0.08 * clock(k / FPS)) for k in range(60)]  # its area by 8 % each side
+    shots = [swinging(clock, k / FPS, 0.0, rng, radius=size) for k, size in enumerate(sizes)]
+    film, table = write(tmp_path / "bob.mp4", shots), tmp_path / "bob.csv"
+    assert main(["track", str(film), "--bob", "200,38,44", "--out", str(table)]) == 0
+    m = udd.read_measurement(table)
+    assert m.seen.mean() > 0.97
+    assert np.nanstd(m["theta"] - np.array([clock(t) for t in m.t])) < 1e-3
+
+
+def test_a_path_that_is_no_circle_is_refused(clock: Callable[[float], float], tmp_path: Path) -> None:
+    """As of the lower bob of a double pendulum."""
+    rng = np.random.default_rng(4)
+    long = [200 + 30 * np.sin(0.9 * k) for k in range(60)]
+    shots = [swinging(clock, k / FPS, 0.0, rng, long=each) for k, each in enumerate(long)]
+    with pytest.raises(TrackError, match="the bob's path is no circle"):
+        udd.track(write(tmp_path / "bob.mp4", shots), bob="red")

@@ -77,7 +77,9 @@ def add(commands: Any) -> None:
         "such as lens=off,readout=0.02 (default: all on)",
     )
     parser.add_argument(
-        "--bob", metavar="COLOUR", help="the film is one of a plain pendulum with a bob of this colour"
+        "--bob",
+        metavar="COLOUR",
+        help="the film is one of a plain pendulum with a bob of this colour (or codes: 150,105,65)",
     )
     parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob [m]")
     parser.add_argument(
@@ -284,9 +286,7 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         options["region"] = numbers([args.region], "--region")
     if args.calibrate is not None:
         options["calibrate"] = _calibrate(args.calibrate)
-    if args.bob is not None:
-        _check_bob(args.bob)
-    options |= {"bob": args.bob, "length": args.length}
+    options |= {"bob": None if args.bob is None else _bob(args.bob), "length": args.length}
     return {**options, "refine": False if args.fast else None, "config": args.config}
 
 
@@ -303,11 +303,17 @@ def _rates(said: str | None) -> Any:
     return rates if len(rates) > 1 else rates[0][1]
 
 
-def _check_bob(colour: str) -> None:
+def _bob(colour: str) -> str | list[int]:
+    """A colour's name, or sRGB codes like 150,105,65."""
     from udd.markers.layout import NAMED
 
-    if colour not in NAMED:
-        raise UddError(f"--bob must be one of {', '.join(NAMED)}, not {colour}")
+    if colour in NAMED:
+        return colour
+    try:
+        return [int(code) for code in colour.split(",", 2)]
+    except ValueError:
+        names = ", ".join(NAMED)
+        raise UddError(f"--bob must be one of {names}, or codes like 150,105,65, not {colour}") from None
 
 
 def _calibrate(said: str) -> dict[str, Any]:

@@ -76,7 +76,19 @@ def write_tracked(
 def _head(m: Measurement, checked: Health | None) -> Head:
     missing = m.meta.get("frames_missing")
     cut = f"{missing} frames that the file promises are missing: it may be cut off."
-    notes = (Paragraph(cut, "warn"),) if missing else ()
+    said = [cut] if missing else []
+    said += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in m.meta.get("doubts", ())]
+    if "camera_moved_px" in m.meta:
+        moved, error = float(m.meta["camera_moved_px"]), float(m.meta["camera_sigma_px"])
+        said.append(
+            f"The camera moved, by {moved:.2g} pixels r.m.s.; what stands still about the disk shows it to "
+            f"{error:.1g} pixels, and it is undone."
+        )
+    if m.meta.get("mirrored"):
+        said.append("The film is mirrored, as the order of the marks shows; it was mirrored again.")
+    if m.meta.get("turned"):
+        said.append("The film was turned upright, as gravity and the drive show.")
+    notes = tuple(Paragraph(text, "warn") for text in said)
     return Head("What the film shows", headline(m), numbers=numbers(m, checked), notes=notes)
 
 

@@ -54,6 +54,7 @@ from .tracked_frame import TrackedFrame
 
 Array = NDArray[np.float64]
 Watch = Callable[[TrackedFrame], object]
+GLUED = 0.3e-3  # m: the marks' middle against the disk's, if the rim does not show
 UNSURE = 0.005  # of the disk's radius: a position known no better is not given
 
 
@@ -267,7 +268,7 @@ def _measured(
     look_over: Survey,
     camera: CameraMotion | None,
     options: TrackOptions,
-    progress: bool,
+    progress: Progress,
     watch: Watch | None,
 ) -> Tracking:
     """One run over a film whose pictures are corrected as far as is known."""
@@ -359,6 +360,8 @@ def _to_metres(
     tracks = replace(tracks, angle=turns.angle)
     # where the layout is taken as said, so is the centre
     by_hand = 0.0 if rim is not None and options.calibrate.layout else options.sigma.layout
+    if rim is None and options.layout.standard:
+        by_hand = GLUED
     centre_sigma = by_hand * camera.scale
     if disk.rim is not None and options.calibrate.layout:
         centre_sigma = disk.rim.centre_sigma

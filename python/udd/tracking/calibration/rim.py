@@ -16,6 +16,10 @@ SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
 SHIFT = 0.2  # pixels by which light or lens may shift a rim in the picture
 ROUNDS = 20
 LEAST = 0.01  # pixels: the radius is known no better
+CLEAR, SHARE = (
+    25.0,
+    0.25,
+)  # of 255 of light, and of the disk's light: the wall must be darker by the lesser
 SMEAR = 3.0  # pixels each side of the rim that lens and compression blur
 
 
@@ -142,7 +146,7 @@ def _rim(
     half = (inner + outer) / 2
     below = part[:, n : 3 * n + 1] < half[:, None]
     first = np.argmax(below, axis=1)
-    good = open_ & (inner - outer >= 25) & below.any(axis=1) & (first > 0)
+    good = open_ & (inner - outer >= np.minimum(CLEAR, SHARE * inner)) & below.any(axis=1) & (first > 0)
     at = n + first[good]
     before, after = part[good, at - 1], part[good, at]
     fraction = (before - half[good]) / (before - after)

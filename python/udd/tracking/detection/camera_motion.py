@@ -23,6 +23,7 @@ FEWEST = 10  # points that must go the same way
 SHARE = 0.25  # of all that can be followed that must
 BACK = 0.7  # pixels by which a point may come back elsewhere when it is followed back
 OFF = 0.7  # pixels by which a point may miss the common motion
+SURE = 5.0  # standard errors by which a view may be off without being another
 STEADY = 0.2  # pixels: a camera that moves less is at rest
 AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
 PATCH = 5  # pixels about a point whose light is compared
@@ -76,7 +77,8 @@ class CameraMotion:
         if not self.known.any():
             return True
         away = np.abs(self.moved) + self.turned * abs(self.middle)
-        return bool(np.nanquantile(away, 0.99) < STEADY)
+        unsure = self.sigma[:, 0] + self.sigma[:, 2] * abs(self.middle)
+        return bool(np.nanquantile(away - SURE * unsure, 0.99) < STEADY)
 
     @property
     def as_bright(self) -> bool:
@@ -166,7 +168,8 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     if seen.known.mean() < KNOWN or (seen.steady and seen.as_bright):
         return None
     moved = background.follow(film.pictures())
-    return moved if moved.known.mean() >= KNOWN else None
+    still = moved.steady and moved.as_bright
+    return None if still or moved.known.mean() < KNOWN else moved
 
 
 class _Seen(NamedTuple):

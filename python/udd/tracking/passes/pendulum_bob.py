@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +26,11 @@ Array = NDArray[np.float64]
 STRONG = 14.0  # of 127: how much more of its colour than the background a bob has
 SMALL = 12  # pixels of colour that are no bob
 SHARE = 0.4  # of its colour and light from which on a pixel counts as the bob's
-HALF_HIDDEN = 0.93  # share of the usual size below which the middle is not the bob's
+HALF_HIDDEN = 0.93  # share of the size in the last frames below which the middle is not the bob's
 TOO_MUCH = 1.15  # and above which something else of its colour is there
+LEAST, MOST = 0.87, 1.2  # the same of the size in the whole film
+RECENT = 5  # frames
+ROUND = 0.03  # of the radius: a path that is off by more is no circle
 MOVED = 3.0  # pixels: a bob that was to move by less may look like a copy
 SURE = 0.02  # of the length by which the pivot may be unsure
 
@@ -64,11 +68,15 @@ def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], objec
     size = _size(film, some, behind, options)
     last: NDArray[np.uint8] | None = None
     path: list[complex] = []
+    areas: deque[float | None] = deque(maxlen=RECENT)  # of the last frames; None: not seen
     for picture in film.pictures():
         tick(picture)
         blob, flag = None, _flag(picture, behind)
         if not flag:
-            blob = locate_bob(picture, behind, options, size, film.full_range)
+            blob = locate_bob(picture, behind, options, None, film.full_range)
+            if blob is not None and not _whole(blob.area, size, areas):
+                blob = None
+            areas.append(None if blob is None else blob.area)
             flag = "" if blob is not None else lost("the bob is not seen, or partly hidden")
         if blob is not None and last is not None and _copy(picture.y, last, blob, path):
             blob, flag = None, REPEATED
@@ -77,6 +85,13 @@ def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], objec
         rows.append((picture.t, flag, blob))
         last = picture.y
     return _angles(film, rows, options, noise)
+
+
+def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
+    """Whether a bob is seen whole: light changes its size little by little, what hides it does so at once."""
+    seen = [a for a in recent if a is not None]
+    usual = float(np.median(seen)) if seen else size
+    return LEAST * size < area < MOST * size and HALF_HIDDEN * usual < area < TOO_MUCH * usual
 
 
 def _background(some: Sequence[Picture]) -> tuple[Picture, float]:
@@ -233,6 +248,12 @@ def _angles(
     open_for, open_sigma = (given, 0.0) if given is not None else _exposure(t[seen], at[seen], moments[seen])
     at, _ = at_middle(t, at, np.zeros(len(t)), open_for)
     path = circle(at[seen])
+    off = 1.48 * float(np.median(np.abs(path.rest - np.median(path.rest))))
+    if off > ROUND * path.radius:
+        raise TrackError(
+            f"{film.path}: the bob's path is no circle ({off:.1f} pixels off one of {path.radius:.0f}): is "
+            "it the lower bob of a double pendulum, or are there several of that colour (then say region)?"
+        )
     pivot, pivot_sigma, origin = path.centre, path.sigma[0], "circle of the bob"
     if options.pivot is not None:
         pivot, pivot_sigma, origin = complex(*options.pivot), 0.0, "given"

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.calibration_items import Calibrate, Estimate
+from udd.errors import outside
 from udd.tracking.calibration.exposure import Exposure, exposure
 from udd.tracking.calibration.exposure import again as retimed
 from udd.tracking.calibration.rim import SPAN, Rim, outline
 from udd.tracking.calibration.rolling_shutter import Readout, readout
+from udd.tracking.calibration.scale import REACH
 from udd.tracking.detection.candidates import colours_of
 from udd.tracking.detection.colour_blobs import Sight
 from udd.tracking.detection.colour_mixing import mixed
@@ -198,13 +201,18 @@ def _rim(
     view: NDArray[np.bool_],
     options: TrackOptions,
 ) -> Rim | None:
-    """The disk's outline; None where it does not show and the layout says where its centre is."""
+    """The disk's outline; None if it does not show, then the marks say where its centre is."""
     try:
         return outline(sharp, look, view, rim_span(options))
-    except TrackError as error:
-        if not options.layout.standard:
-            return None
-        raise TrackError(f"{film.path}: {error}") from None
+    except TrackError:
+        if options.layout.standard:
+            reach = options.mark_distance or REACH * options.disk_radius
+            warnings.warn(
+                f"{film.path}: the disk's rim is not seen against the background; its centre and scale are "
+                f"those of the marks, {1e3 * reach:.3g} mm from it",
+                stacklevel=outside(),
+            )
+        return None
 
 
 def rim_span(options: TrackOptions) -> tuple[float, float]:
