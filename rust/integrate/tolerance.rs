@@ -230,6 +230,11 @@ pub enum Failure {
          ever faster; end it earlier"
     )]
     EverShorter { t: f64 },
+    #[error(
+        "a tangent grows or dies out beyond the range of numbers within an interval, by t = {t}: use a shorter dt, or \
+         another start if a contact sticks there"
+    )]
+    LostTangent { t: f64 },
     #[error("interrupted")]
     Interrupted,
 }

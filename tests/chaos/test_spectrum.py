@@ -177,6 +177,22 @@ def test_covariant_vectors():
     assert found.local_exponents.sum(axis=1) == pytest.approx(-np.ones(400), abs=1e-8)
 
 
+@pytest.mark.parametrize("dt", [20.0, 50.0, 300.0])
+def test_covariant_vectors_of_long_intervals(dt):
+    """Within them tangents become parallel: with dt = 50 the last exponent was -0.53 instead of -1.2."""
+    found = udd.covariant_vectors(udd.DLE(1.0), 4, dt=dt, transient=200.0)
+    flow = udd.DLE(1.0).rates(found.t, found.state)
+    flow /= np.linalg.norm(flow, axis=1, keepdims=True)
+    assert np.abs(np.einsum("kn,kn->k", flow, found.vectors[:, 1])).min() > 1 - 1e-6
+    assert found.local_exponents.sum(axis=1) == pytest.approx(-np.ones(4), abs=1e-7)
+
+
+@pytest.mark.parametrize("dt", [1e3, 1e10, 1e300])
+def test_an_interval_in_which_tangents_leave_the_range_of_numbers_is_said(dt):
+    with pytest.raises(udd.IntegrationError, match=r"within an interval, by t = .*: use a shorter dt"):
+        udd.covariant_vectors(udd.DLE(1.0), 2, dt=dt)
+
+
 def test_kaplan_yorke():
     assert kaplan_yorke([-1.0, -2.0]) == 0.0
     assert kaplan_yorke([0.5, 0.0, -0.5]) == 3.0

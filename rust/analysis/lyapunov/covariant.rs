@@ -9,6 +9,11 @@ use crate::integrate::{Ending, Failure, Integrator, Method, Tolerance, WithTange
 use crate::model::System;
 use crate::scalar::{Dual, Mask};
 
+/// The part of a tangent outside the span of those before it, as a share of the tangent, below which rounding hides it.
+const PARALLEL: f64 = 1e-6;
+/// Growth of a direction beyond which, or beyond the inverse of which, a product of triangles is no longer a number.
+const LARGEST_GROWTH: f64 = 1e290;
+
 /// Where an orbit and its tangents were at equal distances of time.
 #[derive(Clone, Debug)]
 pub struct CovariantFrames<const D: usize> {
@@ -24,12 +29,13 @@ pub struct CovariantFrames<const D: usize> {
 /// Follows an orbit from `x0` for `count` intervals of length `dt`. The last `idle` states only fill up the number.
 ///
 /// In each interval the frame is multiplied by the flow's derivative and made orthonormal again, which
-/// leaves a triangular matrix. Run backwards through these, almost any vectors of the spans of the first 1,
+/// leaves a triangular matrix; in a long interval this happens more than once. Run backwards through these, almost any vectors of the spans of the first 1,
 /// 2, ... directions converge to the covariant ones (F. Ginelli et al., Physical Review Letters 99 (2007)
 /// 130601); those of the last intervals are not converged.
 ///
 /// # Errors
-/// Where the run fails, ends on the wall, or a direction dies out where a contact sticks.
+/// Where the run fails, ends on the wall, or a tangent grows or dies out beyond the range of numbers: in an interval that
+/// is too long, or where a contact sticks.
 pub fn frames<M, K, const D: usize>(
     system: M,
     method: K,
@@ -52,6 +58,7 @@ where
     for k in 0..count {
         stop.check()?;
         let end = (k + 1) as f64 * dt;
+        let mut triangle = SMatrix::<f64, D, D>::identity();
         while driver.t() < end {
             stop.check()?;
             if driver.advance(end)? == Ending::Wall {
@@ -60,21 +67,36 @@ where
             if budget.exceeded(driver.counts().accepted, driver.t()) {
                 return Err(Failure::EverShorter { t: driver.t() });
             }
+            let carried = matrix(driver.x());
+            let (q, r) = triangular(carried);
+            if driver.t() < end && !is_nearly_parallel(&carried, &r) {
+                continue;
+            }
+            // A long interval has several such products, of which each is accurate.
+            triangle = r * triangle;
+            if !triangle
+                .diagonal()
+                .iter()
+                .all(|length| (1.0 / LARGEST_GROWTH..LARGEST_GROWTH).contains(length))
+            {
+                return Err(Failure::LostTangent { t: driver.t() });
+            }
+            let x = driver.x().map(|x| x.re);
+            let renewed = std::array::from_fn(|n| Dual { re: x[n], d: std::array::from_fn(|i| q[(n, i)]) });
+            driver.set_state(Mask::from_lanes(|_| true), renewed);
         }
-        let (q, r) = triangular(matrix(driver.x()));
-        if !r.diagonal().iter().all(|&length| length > 0.0) {
-            return Err(Failure::NotFinite { t: driver.t() });
-        }
-        let x = driver.x().map(|x| x.re);
-        let renewed = std::array::from_fn(|n| Dual { re: x[n], d: std::array::from_fn(|i| q[(n, i)]) });
-        driver.set_state(Mask::from_lanes(|_| true), renewed);
-        states.push(x);
-        bases.push(q);
-        triangles.push(r);
+        states.push(driver.x().map(|x| x.re));
+        bases.push(matrix(driver.x()));
+        triangles.push(triangle);
     }
     let growth = triangles.iter().map(|r| std::array::from_fn(|i| r[(i, i)].ln())).collect();
     let covariant = backwards(&bases, &triangles, stop)?;
     Ok(CovariantFrames { states, growth, covariant })
+}
+
+/// Whether a tangent lies almost in the span of those before it, as after a long time all do.
+fn is_nearly_parallel<const D: usize>(carried: &SMatrix<f64, D, D>, r: &SMatrix<f64, D, D>) -> bool {
+    !(0..D).all(|i| r[(i, i)] >= PARALLEL * carried.column(i).norm())
 }
 
 /// The tangents as columns.
