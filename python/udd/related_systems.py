@@ -23,6 +23,7 @@ Pendulums have the paper's dimensionless form, ``theta = 0`` hanging, and the st
 
 from __future__ import annotations
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import number
 from udd.models import Model
 
@@ -42,6 +43,7 @@ __all__ = [
 ]
 
 
+@checked_arguments
 def lorenz(sigma: float = 10.0, r: float = 28.0, b: float = 8 / 3) -> Model:
     """The Lorenz system, for the state ``[x, y, z]``.
 
@@ -84,6 +86,7 @@ def lorenz(sigma: float = 10.0, r: float = 28.0, b: float = 8 / 3) -> Model:
     )
 
 
+@checked_arguments
 def scaled_lorenz(w: float, epsilon: float, b: float = 8 / 3) -> Model:
     """The Lorenz system in the variables of the DLE, for the state ``[omega, y, z]``.
 
@@ -129,6 +132,7 @@ def scaled_lorenz(w: float, epsilon: float, b: float = 8 / 3) -> Model:
     )
 
 
+@checked_arguments
 def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravity: float = 1.0) -> Model:
     """Malkus' waterwheel, for the state ``[omega, a, b]``: spin, and the water's sine and cosine parts.
 
@@ -188,6 +192,7 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
     )
 
 
+@checked_arguments
 def pendulum(r: float, friction: float = 1.0, torque: float = 0.0) -> Model:
     """The damped pendulum that the disk is without a drive, for the state ``[v, theta]``.
 
@@ -232,6 +237,7 @@ def pendulum(r: float, friction: float = 1.0, torque: float = 0.0) -> Model:
     return _pendulum("-friction*v - r*sin(theta) + torque", r=r, friction=friction, torque=torque)
 
 
+@checked_arguments
 def torqued_pendulum(r: float, friction: float, amplitude: float, frequency: float) -> Model:
     """A pendulum driven by a periodic torque, for the state ``[v, theta]``.
 
@@ -276,6 +282,7 @@ def torqued_pendulum(r: float, friction: float, amplitude: float, frequency: flo
     )
 
 
+@checked_arguments
 def shaken_pendulum(r: float, friction: float, amplitude: float, frequency: float) -> Model:
     """A pendulum whose suspension point moves up and down, for the state ``[v, theta]``.
 
@@ -321,6 +328,7 @@ def shaken_pendulum(r: float, friction: float, amplitude: float, frequency: floa
     )
 
 
+@checked_arguments
 def pumped_pendulum(r: float, friction: float, amplitude: float, frequency: float) -> Model:
     """A pendulum whose length changes by the clock, for the state ``[v, theta]``.
 
@@ -367,6 +375,7 @@ def pumped_pendulum(r: float, friction: float, amplitude: float, frequency: floa
     )
 
 
+@checked_arguments
 def pumped_swing(
     r: float, friction: float = 0.0, depth: float = 0.1, quickness: float = 50.0, sharpness: float = 1e3
 ) -> Model:
@@ -431,6 +440,7 @@ def pumped_swing(
     )
 
 
+@checked_arguments
 def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
     """Huygens' isochronous pendulum between cycloidal cheeks, for the state ``[v, theta]``.
 
@@ -472,6 +482,7 @@ def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
     return _pendulum("-friction*v - (r - v^2)*tan(theta)", r=r, friction=friction)
 
 
+@checked_arguments
 def walking_droplet(R: float, memory: float = float("inf")) -> Model:
     """A droplet that walks on the waves of its own bounces, for the state ``[v, y, z]``.
 

@@ -29,6 +29,8 @@ CASES = {
     ),
     "times": "udd.simulate(udd.DLE(1.0), np.arange(5e7), [1, 1, 1])",
     "runs": "udd.ensemble(udd.DLE(1.0), np.arange(10_000), np.ones((100_000, 3)))",
+    "states up to a longest period": "udd.periodic_orbit(udd.DLE(9.0), max_period=2**31)",
+    "times of an endless search": "udd.connections(udd.DLE(4.0, B=0.2), 'w', (4.0, 4.5), n=2, t_max=1e308)",
     "times of a cycle": "udd.periodic_orbit(udd.DLE(9.0)).trajectory(10**12)",
 }
 

@@ -36,11 +36,11 @@ def require_writable(path: str | os.PathLike[str]) -> None:
         There is no such folder, no file can be made in it, or the path is a folder.
     """
     target = Path(path)
-    if target.is_dir():
-        raise UddError(f"{target} is a folder, not a file to write to")
-    if not target.parent.is_dir():
-        raise UddError(f"{target}: there is no folder {target.parent}")
     try:  # rights alone do not say it: a file system may be full, read-only, or refuse the name
+        if target.is_dir():
+            raise UddError(f"{target} is a folder, not a file to write to")
+        if not target.parent.is_dir():
+            raise UddError(f"{target}: there is no folder {target.parent}")
         os.unlink(_new_file(target, ""))
     except OSError as error:
         raise UddError(f"{target} cannot be written: {error.strerror}") from None
@@ -92,9 +92,13 @@ def _new_file(target: Path, suffix: str) -> str:
     """Make an empty file beside the target; the system takes the user's umask from its mode."""
     while True:
         name = target.parent / f".{target.name}.{secrets.token_hex(6)}{suffix}"
-        with contextlib.suppress(FileExistsError):
+        try:
             os.close(os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-            return str(name)
+        except FileExistsError:
+            continue
+        except ValueError:  # a null character
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL)) from None
+        return str(name)
 
 
 def _to_disk(path: str | Path, flags: int) -> None:

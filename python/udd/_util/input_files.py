@@ -49,7 +49,7 @@ class MemoryLimit:
         self.is_argument = limit is not None
         limit = LARGEST if limit is None else limit
         number = isinstance(limit, int | float | np.integer | np.floating) and not isinstance(limit, bool)
-        if not (number and math.isfinite(limit) and limit >= 1):
+        if not (number and 1 <= limit < math.inf):
             raise error(f"limit must be a positive number of bytes, not {limit!r:.80}")
         self.limit, self.left, self.error = int(limit), int(limit), error
 
@@ -71,7 +71,7 @@ class MemoryLimit:
 
     def exceeded(self) -> UddError:
         """The error of data that are too large."""
-        more = re.sub(r"e\+0*", "e", f" (limit={10 * self.limit:.0e} allows more)")
+        more = re.sub(r"e\+0*", "e", f" (limit={10.0 * min(self.limit, 1e300):.0e} allows more)")
         said = f"the data take more than the limit of {in_bytes(self.limit)}"
         return self.error(said + more * self.is_argument)
 

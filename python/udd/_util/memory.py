@@ -9,15 +9,15 @@ from udd import _core
 _MOST = 10**300  # as a float
 
 
-def require_memory(what: str, *counts: int, itemsize: int = 8) -> None:
+def require_memory(what: str, *counts: float, itemsize: int = 8) -> None:
     """Refuse an array that does not fit into free memory.
 
     Parameters
     ----------
     what : str
         What it holds, in the plural, for the message: ``"10 runs"``.
-    *counts : int
-        Its shape.
+    *counts : int or float
+        Its shape; a number of times that is not a whole one yet may be infinite.
     itemsize : int
         Bytes of an element, and of what is made of it meanwhile.
 
@@ -31,4 +31,4 @@ def require_memory(what: str, *counts: int, itemsize: int = 8) -> None:
     >>> from udd._util.memory import require_memory
     >>> require_memory("3 states", 3, 4)
     """
-    _core.require_memory(what, float(min(prod(counts) * itemsize, _MOST)))
+    _core.require_memory(what, float(min(prod(min(count, _MOST) for count in counts) * itemsize, _MOST)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from udd._util.drawable import Drawable
 from udd._util.labelled import of_states
+from udd._util.arguments import checked_arguments
 from udd.errors import ModelError
 from udd.models import Model
 
@@ -158,6 +160,7 @@ class Branch(Drawable):
         pairs = [extremes_of(curve, place.u) for curve, place in self._places]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
+    @checked_arguments
     def crossings(
         self, section: str | None = None, direction: str | None = None
     ) -> tuple[NDArray[np.intp], Floats]:
@@ -179,17 +182,25 @@ class Branch(Drawable):
 
         return crossings_of(self, section, direction)
 
+    @checked_arguments
     def solution(self, i: int) -> Equilibrium | PeriodicOrbit:
         """The equilibrium or cycle of one point of the branch."""
         from .branch_solutions import solution_at
 
-        curve, place = self._places[i]
+        try:
+            curve, place = self._places[operator.index(i)]
+        except IndexError:
+            raise ModelError(
+                f"the branch has {len(self._places)} points, counted from 0: none is {i}"
+            ) from None
         return solution_at(curve, place.u)
 
+    @checked_arguments
     def find(self, kind: str) -> list[BifurcationPoint]:
         """The bifurcation points of one kind."""
         return [point for point in self.points if point.kind == kind]
 
+    @checked_arguments
     def at(self, value: float) -> list[Equilibrium | PeriodicOrbit]:
         """The solutions at a value of the parameter, polished; more than one where the branch folds."""
         from .branch_solutions import solutions_at

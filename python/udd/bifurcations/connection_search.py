@@ -257,7 +257,9 @@ class _Manifold:
         # Between values that are hardly apart it is seen late on which side an equilibrium is passed.
         rates = [abs(way.number) for way in ways if way is not None]
         lasts = self.longest - float(np.log(_NARROW)) / min(rates, default=1.0)
-        for k in range(1, round(_FINE * (_LEAVES + lasts / flow.clock))):
+        most = _FINE * (_LEAVES + lasts / flow.clock)
+        require_memory("states of curves up to t_max", most, count, flow.dim, itemsize=16)
+        for k in range(1, round(most)):
             own = np.flatnonzero(going)
             if not len(own):
                 break

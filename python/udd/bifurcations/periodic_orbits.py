@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
+from udd._util.memory import require_memory
 from udd._util.validation import array, number
 from udd.errors import IntegrationError, ModelError
 from udd.models import Model, beyond_the_edge, require_model
@@ -154,6 +155,7 @@ def periodic_orbit(
     mirrored = False
     if forcing is None:
         span, mirrored = _return_time(flow, free, start, limit)
+    require_memory("pieces of a cycle", 2.0 * span / flow.clock, flow.dim)
     pieces = pieces_for(flow, span)
     run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
     ends = flow.reduced(run.state)
@@ -318,6 +320,7 @@ def _shift_of(flow: FlowMap, nodes: Floats, span: float) -> Floats:
 
 def _return_time(flow: FlowMap, model: Model, start: Floats, longest: float) -> tuple[float, bool]:
     """When the run from a state comes back, and whether it is its mirror image that comes back."""
+    require_memory("states up to max_period", _FINE * longest / flow.clock, flow.dim, itemsize=40)
     count = math.ceil(_FINE * longest / flow.clock)
     times = np.linspace(0.0, longest, count + 1)
     states = flow.reduced(simulate(model, times, start, rtol=1e-10, atol=1e-13, method="auto").state)

@@ -90,6 +90,7 @@ class Section(Drawable):
         self._single("return_times")
         return np.diff(self.t, axis=-1)
 
+    @checked_arguments
     def component(self, name: str) -> _Floats:
         """One component of the points, shape (..., n).
 
@@ -103,6 +104,7 @@ class Section(Drawable):
             raise ModelError(f"the state has no component {name!r}; it has {', '.join(names)}")
         return self.state[..., names.index(name)]
 
+    @checked_arguments
     def of(self, which: int) -> Section:
         """The crossings of one of several surfaces.
 
@@ -136,6 +138,7 @@ class Section(Drawable):
         rest = (self.residual, self.outcome, self.end, self.t_end, self.model)
         return Section(t, state, index, names, directions, found, *rest)
 
+    @checked_arguments
     def return_map(self, component: str) -> tuple[_Floats, _Floats]:
         """Each crossing beside the next one.
 
@@ -157,6 +160,7 @@ class Section(Drawable):
         x = self.component(component)
         return x[..., :-1], x[..., 1:]
 
+    @checked_arguments
     def cusp_map(self, component: str | None = None) -> tuple[_Floats, _Floats]:
         """Lorenz's map: each maximum beside the next one.
 

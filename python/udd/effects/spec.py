@@ -226,6 +226,9 @@ class Effect:
     made: Spec | None = None
 
     def __post_init__(self) -> None:
+        for what in ("momentum", "treatment"):
+            if not isinstance(getattr(self, what), str | None):
+                raise ModelError(f"{what} of {self.name} must be a text, not {getattr(self, what)!r:.80}")
         if self.made is None and self.name not in _specs():
             raise ModelError(f"no effect is called {self.name!r}; there are {', '.join(_specs())}")
         spec = self.spec

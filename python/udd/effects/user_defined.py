@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression, text_of
 from udd._util.validation import array, number
 from udd.errors import ModelError
@@ -171,6 +172,7 @@ class SurfaceSpec(FormulaSpec):
 UNLIMITED = (-np.inf, np.inf)
 
 
+@checked_arguments
 def formula(
     slot: str,
     expression: Expression,
@@ -266,6 +268,7 @@ def written(
     return FormulaSpec(*_described(slot, name, title or name, text, text, listed), listed, text)
 
 
+@checked_arguments
 def curve(
     slot: str,
     coordinate: Expression,
@@ -336,6 +339,7 @@ def curve(
     return spec.make(momentum=momentum, treatment=None, **dict(zip(names, values.tolist(), strict=True)))
 
 
+@checked_arguments
 def surface(
     slot: str,
     coordinates: tuple[Expression, Expression],

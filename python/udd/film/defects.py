@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.validation import array, number
 from udd.errors import UddError
 
 from .camera import Camera
@@ -118,13 +119,12 @@ class Defects:
             "poster": (0, 2), "turned": (-3, 3), "shake": (0, 50),
         }  # fmt: skip
         for name, (low, high) in ranges.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and low <= value <= high):
+            value = number(name, getattr(self, name))
+            if not low <= value <= high:
                 raise UddError(f"{name} must be from {low:g} to {high:g}, got {value!r}")
         shapes = {"off_axis": (2,), "mark_offsets": (4, 2), "mark_strength": (4,)}
         for name, shape in shapes.items():
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if value.shape != shape or not np.isfinite(value).all():
+            if array(name, getattr(self, name)).shape != shape:
                 raise UddError(f"{name} must be finite numbers of shape {shape}, got {getattr(self, name)!r}")
         for name, width, least in (("bumps", 3, -1e3), ("zooms", 2, 0.2), ("gains", 2, 0.01),
                                    ("hands", 2, 0.0), ("clock", 2, 0.01)):  # fmt: skip

@@ -305,6 +305,7 @@ def _times(t: ArrayLike, step: float) -> Array:
     wanted = array("t", t)
     if wanted.ndim == 0:
         end = number("t", float(wanted), above=0.0)
+        require_memory("times of a forecast", end / step)
         return np.linspace(0.0, end, max(round(end / step), 1) + 1)
     if wanted.ndim != 1 or not wanted.size or wanted[0] < 0 or not (np.diff(wanted) > 0).all():
         raise ModelError("t must be a time ahead in s, or a list of such times that increases from 0 on")

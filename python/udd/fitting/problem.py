@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._util.drawable import Drawable
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed, renamed_attribute
+from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
@@ -272,6 +274,7 @@ class Fit(Drawable):
         return result
 
     @renamed(held="fixed")
+    @checked_arguments(error=FitError)
     def budget(self, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
         """Uncertainty budget (GUM) of the fitted numbers, see :mod:`udd.fitting.uncertainty_budget`."""
         from .uncertainty_budget import budget

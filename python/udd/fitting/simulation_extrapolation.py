@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.one_line import OneLine
+from udd._util.random_generator import generator
 from udd._util.validation import whole
 from udd.errors import FitError
 from udd.measurement import InputSignal, Measurement
@@ -92,7 +93,7 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
     """
     if not fit.model.inputs:
         raise FitError("the model has no inputs whose noise could bias it")
-    draws, random = whole("draws", draws, _FEWEST), np.random.default_rng(rng)
+    draws, random = whole("draws", draws, _FEWEST), generator(rng)
     names = list(dict.fromkeys(free.name.partition("[")[0] for free in fit.problem.free))
     priors = {free.name: (free.mean, free.sd) for free in fit.problem.free if np.isfinite(free.sd)}
     each = list(dict.fromkeys(f.name.partition("[")[0] for f in fit.problem.free if f.film is not None))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd._util.drawable import Drawable
+from udd._util.arguments import checked_arguments
 from udd.errors import MeasurementError
 
 __all__ = ["Hold", "InputSignal", "input_signals"]
@@ -48,15 +49,13 @@ class InputSignal(Drawable):
     values: NDArray[np.float64]
     hold: Hold = "linear"
 
+    @checked_arguments(error=MeasurementError)
     def __init__(self, t: ArrayLike, values: ArrayLike, hold: Hold = "linear") -> None:
         if hold not in get_args(Hold):
             raise MeasurementError(f"hold must be one of {', '.join(get_args(Hold))}, not {hold!r}")
         columns = []
         for name, given in (("times", t), ("samples", values)):
-            try:
-                column = np.array(given, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise MeasurementError(f"an input's {name} must be numbers") from None
+            column = np.array(_numbers(f"an input's {name}", given))
             if column.ndim != 1 or not np.isfinite(column).all():
                 raise MeasurementError(f"an input's {name} must be a list of finite numbers")
             column.setflags(write=False)
@@ -79,6 +78,7 @@ class InputSignal(Drawable):
         """The times between which it is known [s]."""
         return float(self.t[0]), float(self.t[-1])
 
+    @checked_arguments(error=MeasurementError)
     def shifted(self, by: float) -> InputSignal:
         """The same signal later by so much [s]."""
         return InputSignal(self.t + by, self.values, self.hold)
@@ -135,9 +135,10 @@ class InputSignal(Drawable):
         pieces.setflags(write=False)
         return pieces
 
+    @checked_arguments(error=MeasurementError)
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
         """Its values at times, of any shape; beyond its ends the value at the end."""
-        at = np.clip(np.asarray(t, dtype=np.float64), *self.span)
+        at = np.clip(_numbers("t", t), *self.span)
         piece = np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, len(self.t) - 2)
         since = at - self.t[piece]
         powers = since[..., None] ** np.arange(4)
@@ -180,3 +181,11 @@ def input_signals(
         str(name): value if isinstance(value, InputSignal) else named_signal(name, t, value)
         for name, value in (given or {}).items()
     }
+
+
+def _numbers(what: str, given: ArrayLike) -> NDArray[np.float64]:
+    """The numbers of an argument, of any shape."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise MeasurementError(f"{what} must be numbers") from None

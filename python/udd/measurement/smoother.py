@@ -98,6 +98,10 @@ def smooth(
     measurement = unwrapped(measurement, angles)
     frame = float(np.median(np.diff(measurement.t)))
     stretches = _stretches(measurement, gap, frame)
+    if max(len(stretch.t) for stretch in stretches) < 2:
+        raise MeasurementError(
+            f"gap is {gap:.3g} s, but usable rows are {frame:.3g} s apart: give a longer one"
+        )
     jerk, step = _learn(stretches)
     contact = float(measurement.meta.get("pivot_sigma", 0.0)) if slip is not None else 0.0
     values = np.full_like(measurement.values, np.nan)

@@ -114,7 +114,7 @@ class Measurement(Drawable):
             if given is not None and not isinstance(given, Mapping):
                 raise MeasurementError(f"{what} must be entries by their names, not {given!r:.80}")
         times = _numbers("t", t)
-        names = _names(names or (tuple(values) if isinstance(values, Mapping) else ()))
+        names = _names(names) or _names(tuple(values) if isinstance(values, Mapping) else ())
         table = _columns("values", values, names)
         if not names:
             names = {3: DISK, 1: PENDULUM}.get(table.shape[1], ())
@@ -223,9 +223,16 @@ class Measurement(Drawable):
         """Rows with ``t0 <= t < t1`` [s]; the times keep their origin, and inputs are whole."""
         return self.rows((self.t >= t0) & (self.t < t1))
 
+    @checked_arguments(error=MeasurementError)
     def rows(self, mask: ArrayLike) -> Measurement:
         """Rows that a boolean mask or an index array picks; inputs are whole."""
         pick = np.asarray(mask)
+        try:
+            self.t[pick]
+        except IndexError:
+            raise MeasurementError(
+                f"mask must be True or False for each of {len(self)} rows, or numbers of rows: {mask!r:.80}"
+            ) from None
         return Measurement(
             self.t[pick],
             self.values[pick],
@@ -274,8 +281,12 @@ class Measurement(Drawable):
             found[name] = (at, signal.values, {"hold": signal.hold} | ({"units": unit} if unit else {}))
         return found
 
+    @checked_arguments(error=MeasurementError)
     def on_rows(self, name: str) -> bool:
-        """Whether an input was sampled at the times of the rows."""
+        """Return True if an input was sampled at the times of the rows."""
+        if name not in self.inputs:
+            known = ", ".join(self.inputs) or "no inputs"
+            raise MeasurementError(f"nothing that drives it is called {name!r:.80}; there are {known}")
         return np.array_equal(self.inputs[name].t, self.t)
 
     def __repr__(self) -> str:
@@ -283,10 +294,12 @@ class Measurement(Drawable):
         driven = f", driven by {', '.join(self.inputs)}" if self.inputs else ""
         return f"<Measurement of {', '.join(self.names)}{driven}: {len(self)} rows{span}>"
 
+    @checked_arguments(error=MeasurementError)
     def with_meta(self, **changes: Any) -> Measurement:
         """The same rows with entries of `meta` replaced or added."""
         return replace(self, meta={**self.meta, **changes})
 
+    @checked_arguments(error=MeasurementError)
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the file format of the package; a reader gets the same bits back.
 
@@ -296,6 +309,7 @@ class Measurement(Drawable):
 
         to_csv(self, path)
 
+    @checked_arguments(error=MeasurementError)
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Write the same table as Parquet (needs pyarrow)."""
         from .write import to_parquet

@@ -126,7 +126,7 @@ class Disk(CompiledModel):
             object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
         object.__setattr__(self, "effects", self._effects(self.effects))
         self._add_bristles()
-        if self.edge not in ("stop", "ignore"):
+        if not isinstance(self.edge, str) or self.edge not in ("stop", "ignore"):
             raise ModelError(f'edge must be "stop" or "ignore", not {self.edge!r}')
 
 

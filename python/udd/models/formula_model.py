@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from udd import _core
+from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression, text_of
 from udd._util.validation import number
 from udd.effects import Effect
@@ -105,6 +106,7 @@ class FormulaModel(Model):
         """Leave everything to the initialisation, which a copy or a pickle does not need."""
         return object.__new__(cls)
 
+    @checked_arguments
     def __init__(
         self,
         states: Sequence[str],
@@ -152,7 +154,7 @@ class FormulaModel(Model):
         _core.model_parameters(self)  # which parses the equations
         if sensors and turns:
             self._set(turning=_turning(self))
-        if mass:
+        if mass is not None and len(mass):
             self._set(mass=_mass_matrix(self, mass))
         added = self._effects(effects)
         if added:
@@ -184,6 +186,7 @@ class FormulaModel(Model):
         """What a measurement may hold: the sensors, or all states where none were given."""
         return tuple(dict(self.observe)) or self.state_names
 
+    @checked_arguments
     def observed(self, t: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
         """What the sensors see of states (the output equation).
 
@@ -240,6 +243,7 @@ class FormulaModel(Model):
         rates = {name: self.equations[name].strip() for name in self.kinematic}
         return {name: speed for name, speed in rates.items() if speed not in rates}
 
+    @checked_arguments
     def mass_matrix(self, states: ArrayLike) -> NDArray[np.float64]:
         """The mass matrix.
 
@@ -273,6 +277,7 @@ class FormulaModel(Model):
             rows.append(entries.rates(0.0, states)[..., : len(row)])
         return np.stack(rows, axis=-2)
 
+    @checked_arguments
     def accelerations(self, along: str) -> dict[str, str]:
         """What a unit force along a coordinate adds to the rates of the speeds, as formulas.
 
@@ -362,6 +367,7 @@ class FormulaModel(Model):
             return {}
         return self.accelerations(along) if along else {slot.removesuffix("'"): ""}
 
+    @checked_arguments
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """The model with other values of some parameters.
 
@@ -377,6 +383,7 @@ class FormulaModel(Model):
         new = [(n, number(f"the parameter {n}", values.get(n, v))) for n, v in self.values]
         return self._with(values=tuple(new), effects=self._effects_with(values))
 
+    @checked_arguments
     def with_inputs(self, *records: Mapping[str, InputSignal], record: int = 0) -> Self:
         """The model with what was measured of its inputs.
 
@@ -414,6 +421,7 @@ class FormulaModel(Model):
             raise ModelError(f"there is no record {record} of the inputs: there are {len(checked)}")
         return self._with(records=tuple(checked) if self.inputs else (), record=record)
 
+    @checked_arguments
     def with_term(self, equation: str, term: Expression, **amplitude: float) -> FormulaModel:
         """The model with a term added to one of its equations.
 

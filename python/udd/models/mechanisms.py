@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression, text_of
+from udd._util.validation import number
 from udd.errors import ModelError
 
 from .formula_model import FormulaModel, cofactor, determinant
@@ -263,14 +264,16 @@ def pendulum_chain(
                 parts.append(f"{back}F{joint}*sign({speed.strip('()')})")
         forces.append(" + ".join(f"({part})" for part in parts))
     values = {
-        f"{name}{i}": float(v) for name, own in columns.items() for i, v in zip(links, own, strict=True)
+        f"{name}{i}": number(f"{name}{i}", v)
+        for name, own in columns.items()
+        for i, v in zip(links, own, strict=True)
     }
     del values[f"l{n}"]
     return mechanism(
         {f"a{i}": f"w{i}" for i in links},
         mass,
         forces,
-        values | {"g": float(g)},
+        values | {"g": number("g", g)},
         angles=[f"a{i}" for i in links],
         inputs=[f"tau{i}" for i in links] if motors else [],
     )

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd._util.validation import number
 from udd.effects import Effect
 from udd.errors import ModelError
@@ -96,6 +97,7 @@ class Pendulum(CompiledModel):
         object.__setattr__(self, "effects", self._effects(effects))
         self._add_bristles()
 
+    @checked_arguments
     def with_gyroscope(self, *, angle: bool = False) -> FormulaModel:
         """The same pendulum as a model whose rate of turn is measured, as by a phone on it.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .style import AXES, FAINT, MANY, MEASURED, SHADES, SQUARE, WIDE, legend_above, new_axes, tidy
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@checked_arguments(error=UddError)
 def bifurcation(
     result: xr.Dataset, ax: Axes | None = None, *, component: str | None = None, colour: str | None = None
 ) -> Axes:
@@ -83,6 +85,7 @@ def bifurcation(
     return ax
 
 
+@checked_arguments(error=UddError)
 def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Which initial states end where: a colour for each attractor, greys for what ends on none.
 

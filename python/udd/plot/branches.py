@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .style import FAINT, axis_of, legend_above, new_axes, tidy
@@ -36,6 +37,7 @@ _OPEN = 400  # lines that a piece may belong to
 _NEAR = 0.12  # crossings of neighbouring cycles are joined within this part of the picture's height
 
 
+@checked_arguments(error=UddError)
 def branches(
     result: Branch | Sequence[Branch],
     ax: Axes | None = None,
@@ -106,6 +108,7 @@ def branches(
     return ax
 
 
+@checked_arguments(error=UddError)
 def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = None) -> Axes:
     """The one diagram: what motions do up and down, hysteresis shaded, branches and their points over it.
 

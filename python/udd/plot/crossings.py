@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .style import AFTER, FAINT, MANY, SHADES, SQUARE, axis_of, label, legend_above, new_axes, tidy
@@ -20,6 +21,7 @@ _TURNING = ("beta", "theta")
 _SAME = 1e-9  # a component that varies by less of its size is the same everywhere
 
 
+@checked_arguments(error=UddError)
 def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, str] | None = None) -> Axes:
     """The points of a section in the plane of two components; several surfaces in several colours.
 
@@ -62,6 +64,7 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
     return ax
 
 
+@checked_arguments(error=UddError)
 def return_map(result: Section, ax: Axes | None = None, *, component: str | None = None) -> Axes:
     """Each crossing's component over that of the crossing before, with the diagonal.
 

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
+from udd.errors import UddError
+
 from .inputs import require
 from .style import AFTER, ALIKE, AXES, BEFORE, FLOOR, MEASURED, legend_above, new_axes, tidy
 
@@ -32,6 +35,7 @@ _PLACES = 300
 _ACROSS = 60  # along each coordinate of a surface
 
 
+@checked_arguments(error=UddError)
 def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -> Axes:
     """What an equation lacks as a function of a coordinate, with a band that holds it with 95 %.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd._util.small_units import small_unit
 from udd.errors import UddError
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _LINE = 34  # letters of a candidate's title in one line
 
 
+@checked_arguments(error=UddError)
 def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: int = 12) -> Axes:
     """The decrease in chi2 that each candidate would bring, with what it takes to be believed.
 
@@ -99,6 +101,7 @@ def threshold(discovery: Any, stage: int) -> float:
     return float(chi_squared.isf(ALPHA / discovery.comparisons[stage], 1))
 
 
+@checked_arguments(error=UddError)
 def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     """How far the model runs away from data it has not seen: before, after, and what no model could beat.
 

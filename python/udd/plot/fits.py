@@ -7,10 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .inputs import first_film, require_fit
-from .style import AFTER, CHANNELS, EQUATIONS, MEASURED, axis_of, label, legend_above, new_axes, tidy
+from .style import (
+    AFTER,
+    CHANNELS,
+    EQUATIONS,
+    MEASURED,
+    axis_of,
+    label,
+    legend_above,
+    new_axes,
+    require_colour,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +32,7 @@ Array = NDArray[np.float64]
 _BINS = 24
 
 
+@checked_arguments(error=UddError)
 def residuals(
     fit: Any,
     ax: Axes | None = None,
@@ -55,6 +68,7 @@ def residuals(
         No such equation or coordinate, or not a fit.
     """
     require_fit(fit)
+    require_colour(colour)
     names = fit.model.state_names
     if equation is not None and equation not in names:
         raise UddError(f"the model has equations for {', '.join(names)}, not for {equation}")
@@ -87,6 +101,7 @@ def residuals(
     return ax
 
 
+@checked_arguments(error=UddError)
 def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> Axes:
     """What was seen less what was fitted, against time, with a band of two standard deviations of the noise.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .inputs import require
@@ -18,6 +19,7 @@ _BEFORE = 1.0  # s of data shown before the start
 _MEMBERS = 12  # drawn one by one
 
 
+@checked_arguments(error=UddError)
 def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = None) -> Axes:
     """The median and the band of a forecast, a few of its members, and the measurement where there is one.
 

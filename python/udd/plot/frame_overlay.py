@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .style import SQUARE, new_axes
@@ -18,6 +19,7 @@ MARKS = ("#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b")
 _LINE = "#00e5ff"  # stands out on grey, black and white alike
 
 
+@checked_arguments(error=UddError)
 def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes:
     """A frame of the film with the disk's outline, its marks, its centre and the contact drawn over it.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 from udd.models import Model
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@checked_arguments(error=UddError)
 def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = None) -> Axes:
     """The friction coefficient k(Omega) of a model, with a band of one standard error where it was fitted.
 

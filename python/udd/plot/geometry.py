@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from udd._util.validation import number
+from udd._util.arguments import checked_arguments
+from udd._util.validation import array, number
 from udd.errors import UddError
 
 from .style import AFTER, BEFORE, FAINT, MEASURED, SQUARE, new_axes
@@ -21,12 +22,14 @@ if TYPE_CHECKING:
 #: Of the paper's device [m]: the wheels' radius, the width of the wider rim, the disk's thickness.
 WHEEL, FLAT, THICKNESS = 0.03, 0.013, 0.0015
 
+_LARGEST = 1e9  # cm
 _CM = 100.0
 _THETA, _PHI, _DISTANCE = np.deg2rad(38.0), np.deg2rad(52.0), 0.6  # of the snapshot; distance in radii
 _MARK = 0.8  # where the mark sits, in radii
 _TURNS = tuple(np.pi / 8 * k for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8))
 
 
+@checked_arguments(error=UddError)
 def geometry(
     ax: Axes | None = None, *, state: ArrayLike | None = None, R: float = 0.08, view: str = "front"
 ) -> Axes:
@@ -67,6 +70,8 @@ def geometry(
     if view not in ("front", "side"):
         raise UddError(f'view must be "front" or "side", not {view!r}')
     radius = _CM * number("R", R, above=0.0)
+    if radius > _LARGEST:
+        raise UddError(f"R must be at most {_LARGEST:g} cm to be drawn, not {radius:g} cm")
     ax = new_axes(ax, size=SQUARE)
     names = _side(ax, radius) if view == "side" else _front(ax, radius, *_centre_and_mark(state, radius))
     ax.set_aspect("equal")
@@ -80,8 +85,8 @@ def _centre_and_mark(state: ArrayLike | None, radius: float) -> tuple[NDArray[np
     """The centre [cm] and beta."""
     if state is None:
         return _DISTANCE * radius * _towards(_THETA), _THETA + _PHI
-    values = np.asarray(state, dtype=float)
-    if values.shape != (4,) or not np.isfinite(values).all():
+    values = array("state", state)
+    if values.shape != (4,):
         raise UddError(f"the state must be four finite numbers [Omega, Y, Z, beta], not {state!r}")
     return _CM * values[1:3], float(values[3])
 

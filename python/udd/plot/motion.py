@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 from udd.simulation.energy import angular_momentum
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 _COLOURS = (AFTER, BEFORE, "#009e73", "#cc79a7")
 
 
+@checked_arguments(error=UddError)
 def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[str] | None = None) -> Axes:
     """Coordinates against time; of a fit the measured ones as dots and the fitted ones as lines.
 
@@ -88,6 +90,7 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
     return ax
 
 
+@checked_arguments(error=UddError)
 def orbit(result: Any, ax: Axes | None = None) -> Axes:
     """The path of the disk's centre in the picture's plane, with the contact and the reach of the wheels.
 
@@ -150,6 +153,7 @@ def _device(ax: Axes, drawn: Sequence[Motion]) -> None:
     ax.set_aspect("equal", adjustable="box")
 
 
+@checked_arguments(error=UddError)
 def phase_space(result: Any, ax: Axes | None = None) -> Axes:
     """The orbit in three dimensions: J, Y, Z of the disk with J = I Omega - W Y; omega, y, z of the DLE.
 

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
+from udd.errors import UddError
+
 from .fits import binned, coordinates
 from .inputs import require_fit
 from .style import AFTER, AXES, BEFORE, EQUATIONS, new_axes
@@ -21,6 +24,7 @@ _CHANCE = 1e-3  # over all cells together
 _SHORT = {"t": "time T", "R": "R", "beta": "β mod 2π", "Omega": "Ω", "theta": "θ"}
 
 
+@checked_arguments(error=UddError)
 def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axes:
     """The mean residual of every equation (rows) along every coordinate (columns), with bands of two errors.
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from udd.errors import UddError
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -111,6 +113,19 @@ def legend_above(
         )
         if legend.get_window_extent().width <= width:
             return
+
+
+def require_colour(colour: object) -> None:
+    """Refuse what Matplotlib knows no colour by.
+
+    Raises
+    ------
+    UddError
+    """
+    from matplotlib.colors import is_color_like
+
+    if not is_color_like(colour):
+        raise UddError(f'colour must be one that Matplotlib knows, such as "#0072b2", not {colour!r:.80}')
 
 
 def tidy(ax: Axes, grid: bool = True) -> None:

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd.errors import UddError
 
 from .inputs import require
-from .style import AFTER, CHANNELS, FAINT, new_axes, tidy
+from .style import AFTER, CHANNELS, FAINT, new_axes, require_colour, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 _SHOWN = 1.0  # s, or 25 frames if that is more
 
 
+@checked_arguments(error=UddError)
 def whiteness(
     innovations: Any,
     ax: Axes | None = None,
@@ -47,6 +49,7 @@ def whiteness(
         No such channel, or no innovations.
     """
     require(innovations, "innovations (udd.discovery) have an autocorrelation", "autocorrelation")
+    require_colour(colour)
     names = innovations.names
     channel = names[0] if channel is None else channel
     if channel not in names:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.input_files import LARGEST
 from udd._util.tables import parsed, read, table
 from udd._util.validation import array, number, whole
@@ -117,6 +119,7 @@ class SweepSpec:
         return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @classmethod
+    @checked_arguments
     def from_dict(cls, data: Mapping[str, Any]) -> SweepSpec:
         """The spec in plain data; `over` may also be a table of names and values.
 
@@ -137,6 +140,7 @@ class SweepSpec:
         return cls(model=model_from_dict(given.pop("model")), over=axes, **given)
 
     @classmethod
+    @checked_arguments
     def from_json(cls, text: str) -> SweepSpec:
         """The spec in JSON.
 
@@ -148,7 +152,8 @@ class SweepSpec:
         return cls.from_dict(parsed("the sweep", text))
 
     @classmethod
-    def read(cls, path: str | Path, *, limit: float = LARGEST) -> SweepSpec:
+    @checked_arguments
+    def read(cls, path: str | os.PathLike[str], *, limit: float = LARGEST) -> SweepSpec:
         """Read the spec in a file: TOML if its name ends so, otherwise JSON.
 
         Parameters

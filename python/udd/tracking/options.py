@@ -151,6 +151,9 @@ class TrackOptions:
         self._set("layout", read_bob(self.bob))
 
     def _check(self) -> None:
+        for name in ("calibrate", "sigma"):
+            if getattr(self, name) is None:
+                raise TrackError(f"{name} must be a table of names and values, not None")
         if self.mark_distance is not None and not self.layout.standard:
             raise TrackError("mark_distance is of the standard marks: a layout says where its own are")
         for name in ("scale", "pivot"):

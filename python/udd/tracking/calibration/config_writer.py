@@ -10,6 +10,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Item
 
+from udd._util.arguments import checked_arguments
 from udd.tracking.options import FIELDS
 from udd.video.reader import TrackError
 
@@ -18,6 +19,7 @@ from .config import settings
 TABLES = ("calibrate", "sigma", "layout")  # TOML wants them after the rest
 
 
+@checked_arguments(error=TrackError)
 def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, comment: str = "") -> None:
     """Write what is known of a film as a TOML file, for `udd.track(..., config=path)`.
 
