@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 import linecache
 import os
@@ -23,11 +24,12 @@ from hypothesis.strategies import DataObject
 from scipy.integrate import solve_ivp
 
 import udd
+from public_calls import calls
 from udd.video.reader import Film
 
 PACKAGE = str(Path(udd.__file__).parent)
 LONGEST_MESSAGE = 500  # characters
-PATIENCE = 10.0  # seconds before Ctrl-C is pressed
+PATIENCE = 2.0  # seconds before Ctrl-C is pressed
 DEAF = 0.3  # seconds that a run may go on after Ctrl-C; more on a machine that is busy (`UDD_FUZZ_DEAF`)
 
 
@@ -179,91 +181,22 @@ ODD: list[Any] = [
     *(
         np.full(3, np.nan),
         np.datetime64("2026-01-01"),
+        1e-320,
+        [1e-320, float("inf")],
+        [True, 1],
+        {"x": None},
+        {1: 2},
+        np.ones((3, 3), object),
+        np.ones(3, np.complex128),
+        "a/b\0c",
+        b"\xff",
+        type,
         Path("nosuch/file"),
         Exception("x"),
         range(3),
         slice(None),
     ),
 ]
-
-
-@cache
-def calls() -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Return a quick valid call of each public function: the function and its arguments."""
-    dle, disk, start = udd.DLE(1.0), udd.Disk(0.04), [0.0, 1e-3, 0.04, 0.0]
-    run = udd.simulate(disk, np.linspace(0, 1, 30), start)
-    swing = udd.simulate(udd.Pendulum(0.5, k0=0.01), np.linspace(0, 4, 121), [0.0, 0.5])
-    rng = np.random.default_rng(1)
-    record = udd.Measurement(
-        swing.t, {"theta": swing.state[:, 1] + 1e-3 * rng.normal(size=121)}, 1e-3 * np.ones((121, 1))
-    )
-    fit = udd.fit(record, udd.Pendulum(0.5))
-    damped = udd.DLE(2.5, B=0.2)
-    rest = udd.equilibria(damped, initial_states=8)[0]
-    branch = udd.continuation(rest, "w", (1.0, 9.0), max_points=30)
-    lorenz = [1.0, 1.0, 0.1]
-    cycle = udd.periodic_orbit(udd.DLE(10.0), settle=50.0)
-    return {
-        "simulate": (udd.simulate, {"model": dle, "t": 1.0, "state0": lorenz}),
-        "ensemble": (udd.ensemble, {"model": dle, "t": 1.0, "state0": lorenz, "threads": 1}),
-        "lyapunov": (udd.lyapunov, {"w": 1.0, "t": 20.0, "transient": 1.0, "state0": lorenz, "threads": 1}),
-        "lyapunov_spectrum": (
-            udd.lyapunov_spectrum,
-            {"w": 1.0, "t": 20.0, "transient": 1.0, "state0": lorenz},
-        ),
-        "covariant_vectors": (udd.covariant_vectors, {"model": dle, "n": 5, "dt": 0.1, "transient": 1.0}),
-        "poincare": (udd.poincare, {"model": dle, "section": "z", "n": 3, "transient": 1, "state0": lorenz}),
-        "bifurcation": (
-            udd.bifurcation,
-            {"model": dle, "parameter": "w", "values": [1.0], "n": 5, "transient": 5, "attractors": False},
-        ),
-        "basins": (udd.basins, {"model": udd.DLE(4.5), "grid": {"y": [0.1]}, "n": 12, "transient": 5}),
-        "equilibria": (udd.equilibria, {"model": damped, "initial_states": 4}),
-        "continuation": (
-            udd.continuation,
-            {"start": rest, "parameter": "w", "bounds": (1.0, 9.0), "ds": 0.05, "max_points": 5},
-        ),
-        "periodic_orbit": (udd.periodic_orbit, {"model": udd.DLE(10.0), "settle": 20.0}),
-        "locus": (udd.locus, {"point": branch.points[0], "parameter": "B", "max_points": 3})
-        if branch.points
-        else (print, {}),
-        "lifetimes": (
-            udd.lifetimes,
-            {"model": udd.DLE(10.0), "starts": [lorenz], "attractors": cycle, "t_max": 5.0},
-        ),
-        "energy_balance": (udd.energy_balance, {"run": run}),
-        "Measurement": (udd.Measurement, {"t": [0, 1, 2.0], "values": {"theta": [0, 0.1, 0.2]}}),
-        "Measurement.slice": (lambda **given: record.slice(**given), {"t0": 0.0, "t1": 1.0}),
-        "InputSignal": (udd.InputSignal, {"t": [0, 1, 2.0], "values": [0, 1, 2.0]}),
-        "DLE": (udd.DLE, {"w": 1.0, "B": 0.1}),
-        "Disk": (udd.Disk, {"W": 0.04, "R": 0.08, "k0": 0.012, "effects": ()}),
-        "Pendulum": (udd.Pendulum, {"length": 0.5, "inertia": 0.25, "k0": 0.01}),
-        "Model": (udd.Model, {"states": ["x"], "equations": ["-k*x"], "parameters": {"k": 1.0}}),
-        "with_parameters": (lambda **given: disk.with_parameters(**given), {"values": {"W": 0.05}}),
-        "rates": (lambda **given: dle.rates(**given), {"t": 0.0, "state": lorenz}),
-        "pendulum_chain": (
-            udd.pendulum_chain,
-            {"masses": [1.0], "lengths": [0.3], "centres": [0.15], "inertias": [0.01], "friction": [0.0]},
-        ),
-        "mechanism": (
-            udd.mechanism,
-            {"coordinates": {"q": "v"}, "mass": [["1"]], "forces": ["-k*q"], "parameters": {"k": 1.0}},
-        ),
-        "moved_pendulum": (udd.moved_pendulum, {"length": 0.5, "inertia": 0.3}),
-        "driven_disk": (udd.driven_disk, {"R": 0.06, "k0": 0.01}),
-        "smooth": (udd.smooth, {"measurement": record, "gap": 0.1}),
-        "fit": (udd.fit, {"measurement": record, "model": udd.Pendulum(0.5), "free": ["k0"]}),
-        "forecast": (udd.forecast, {"measurement": record, "model": fit, "members": 4}),
-        "input_bias": (udd.input_bias, {"fit": fit, "draws": 2}),
-        "Defects": (udd.film.Defects, {}),
-        "SweepSpec": (
-            udd.SweepSpec,
-            {"quantity": "lyapunov", "model": dle, "over": {"w": [1.0]}, "options": {"t": 5.0}},
-        ),
-        "read_measurement": (udd.read_measurement, {"path": "nosuch.csv"}),
-        "load": (udd.load, {"path": "nosuch.udd"}),
-        "save": (udd.save, {"result": fit, "path": os.devnull + "/x"}),
-    }
 
 
 # These take long with valid arguments, too: they are called with one argument that is wrong.
@@ -277,7 +210,7 @@ ODD_ONLY = {
 
 
 def arguments(data: DataObject) -> None:
-    """Call a public function with one or two arguments that are odd."""
+    """Call a public function with one or two arguments that are odd, optional ones among them."""
     name = data.draw(st.sampled_from([*calls(), *ODD_ONLY]))
     if name in ODD_ONLY:
         with watched():
@@ -287,10 +220,24 @@ def arguments(data: DataObject) -> None:
         return
     function, given = calls()[name]
     changed = dict(given)
-    for key in data.draw(st.lists(st.sampled_from([*given, "nosuch"]), min_size=1, max_size=2, unique=True)):
+    names = sorted({*given, *optional_arguments(function), "nosuch"})
+    for key in data.draw(st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)):
         changed[key] = data.draw(st.sampled_from(ODD))
-    with watched(), contextlib.redirect_stdout(io.StringIO()):
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), watched(), quiet():
         function(**changed)
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Swallow what a call prints, such as the line of its progress."""
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        yield
+
+
+def optional_arguments(function: Callable[..., Any]) -> list[str]:
+    """The names of the arguments that a function takes by name."""
+    named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return [name for name, one in inspect.signature(function).parameters.items() if one.kind in named]
 
 
 # --- tables and files
