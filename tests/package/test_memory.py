@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 import udd
@@ -40,6 +41,40 @@ CASES = {
 def test_results_that_do_not_fit_into_memory_are_refused(name: str) -> None:
     message = memory_error_of(CASES[name])
     assert "GB" in message and len(message) <= 300, message
+
+
+@pytest.mark.parametrize("shape", [(10**12,), (10**12, 3)])
+def test_arrays_that_stand_for_larger_ones_are_refused_before_they_are_copied(shape: tuple[int, ...]) -> None:
+    repeated, dle = np.broadcast_to(1.0, shape), udd.DLE(10.0)
+    calls: list[Callable[[], object]] = [
+        lambda: dle.rates(0.0, repeated) if len(shape) > 1 else dle.rates(repeated, [1, 1, 1]),
+        lambda: udd.ensemble(dle, 1.0, repeated),
+        lambda: udd.bifurcation(dle, "w", repeated),
+        lambda: udd.equilibria(dle, near=repeated),
+    ]
+    for call in calls:
+        with pytest.raises(MemoryError, match=r"^the numbers of .* take .* GB, .* no room"):
+            call()
+
+
+@pytest.mark.parametrize("max_step", [1e-320, 1e-13])
+def test_steps_too_short_for_a_run_to_end_are_refused(max_step: float) -> None:
+    dle, start = udd.DLE(10.0), [1.0, 1.0, 0.1]
+    calls: list[Callable[[], object]] = [
+        lambda: udd.simulate(dle, 1.0, start, max_step=max_step),
+        lambda: udd.simulate(dle, [-1.0, 0.0], start, max_step=max_step),
+        lambda: udd.ensemble(dle, 1.0, start, max_step=max_step),
+        lambda: udd.lyapunov(1.0, max_step=max_step),
+        lambda: udd.lyapunov_spectrum(1.0, max_step=max_step),
+        lambda: udd.covariant_vectors(dle, 5, max_step=max_step),
+        lambda: udd.poincare(dle, n=5, max_step=max_step),
+        lambda: udd.basins(dle, {"z": [0.0, 1.0]}, n=12, max_step=max_step),
+        lambda: udd.SweepSpec("outcome", dle, {"w": [1.0]}, start, {"t": 5.0, "max_step": max_step}),
+    ]
+    for call in calls:
+        with pytest.raises(ModelError, match=r"max_step is .*: a run of .* more than 1e\+12 such steps"):
+            call()
+    assert udd.simulate(dle, 1e-9, start, max_step=1e-13).outcome == "finished"
 
 
 def test_what_fits_is_not_refused() -> None:

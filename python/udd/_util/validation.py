@@ -8,6 +8,7 @@ from typing import Any, SupportsFloat, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from udd._util.memory import require_memory
 from udd.errors import ModelError
 
 _LARGEST = 2**62  # as a number of the core, with room for sums
@@ -65,6 +66,8 @@ def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
         given: NDArray[Any] = np.asarray(value)
         if given.dtype.kind not in "iuf":
             raise TypeError
+        if given.dtype != np.float64 or not given.flags.c_contiguous:
+            require_memory(f"the numbers of {name}", given.size)
         result = np.require(given, np.float64, ["C", "A"])
     except (TypeError, ValueError):
         raise ModelError(f"{name} must be numbers") from None

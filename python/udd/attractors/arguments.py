@@ -37,7 +37,7 @@ def section_runner(
     rtol, atol = tolerances(options["rtol"], options["atol"])
     mean = None if t_max is None else number("t_max", t_max, above=0.0) / each
     t_each = CLOCKS * clock_of(model, rows) if mean is None else mean
-    longest, threads = longest_step(options["max_step"]), thread_count(options["threads"])
+    longest, threads = longest_step(options["max_step"], t_each), thread_count(options["threads"])
     return SectionRunner(model, surfaces, ways, rtol, atol, threads, t_each, longest)
 
 

@@ -179,7 +179,7 @@ def lyapunov(
     time, skipped = span(t, transient, longest=1e5 * time_scale, skip=400.0 * time_scale)
     goal = number("tol", 2e-3 / time_scale if tol is None else tol, above=0.0)
     rtol, atol = tolerances(rtol, atol)
-    longest = longest_step(max_step)
+    longest = longest_step(max_step, time)
     start = initial_state(model, default_state(model) if state0 is None else state0)
     workers = thread_count(threads)
 

@@ -320,7 +320,6 @@ def poincare(
     count, skipped = whole("n", n, 1), whole("transient", transient, 0)
     chosen = with_defaults("poincare", RUN_OPTIONS, options)
     rtol, atol = tolerances(chosen["rtol"], chosen["atol"])
-    longest = longest_step(chosen["max_step"])
     shape, rows, starts = orbits_of(model, parameters or {}, state0)
     if "atol" not in options:
         atol *= _smallness(starts)
@@ -328,6 +327,7 @@ def poincare(
         end = CLOCKS * clock_of(model, rows) * (count + skipped)
     else:
         end = number("t_max", t_max, above=0.0)
+    longest = longest_step(chosen["max_step"], end)
     jobs = max(len(rows), len(starts))
     with progress_bar(jobs, "orbit", chosen["progress"]) as bar:
         batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), bar.since(), longest)

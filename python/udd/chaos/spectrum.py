@@ -212,7 +212,7 @@ def lyapunov_spectrum(
     rtol, atol = tolerances(rtol, atol)
     start = initial_state(model, default_state(model) if state0 is None else state0)
 
-    run = _Run(model, rtol, atol, longest_step(max_step))
+    run = _Run(model, rtol, atol, longest_step(max_step, time))
     if section is not None:
         run.refuse(section, start)
     found, fate = run.look(start, time, skipped, goal)
@@ -498,7 +498,7 @@ def covariant_vectors(
     step = number("dt", 0.5 * time_scale if dt is None else dt, above=0.0)
     aside = number("transient", 200.0 * time_scale if transient is None else transient, least=0.0)
     rtol, atol = tolerances(rtol, atol)
-    longest = longest_step(max_step)
+    longest = longest_step(max_step, step * n)
     start = initial_state(model, default_state(model) if state0 is None else state0)
     count = n + 2.0 * aside / step  # infinite where dt is tiny
     require_memory(

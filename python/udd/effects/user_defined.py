@@ -423,9 +423,14 @@ def surface(
     return spec.make(momentum=momentum, treatment=None, **given)
 
 
+_MOST_COEFFICIENTS = 2000  # their formula has 10,000 characters
+
+
 def _coefficients(slot: str, name: str, count: int) -> tuple[Parameter, ...]:
     """The parameters of a spline: its coefficients, all amplitudes, in the slot's unit."""
     _slot(slot)
+    if count > _MOST_COEFFICIENTS:
+        raise ModelError(f"a spline has at most {_MOST_COEFFICIENTS} coefficients, not {count}")
     unit = _SLOTS[slot][1] if slot in _SLOTS else ""
     return tuple(_parameter(name, f"c{i}", unit, True, UNLIMITED) for i in range(count))
 

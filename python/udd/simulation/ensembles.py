@@ -162,8 +162,8 @@ def ensemble(
     True
     """
     rtol, atol = tolerances(rtol, atol)
-    longest = longest_step(max_step)
     times, wanted = checked_times(t), slice(None)
+    longest = longest_step(max_step, times if isinstance(times, float) else float(np.ptp(times)))
     if isinstance(times, float):  # of the way there only the end is kept
         times, wanted = np.array([0.0, times] if times else [0.0]), slice(-1, None)
     require_model(model)

@@ -194,6 +194,7 @@ class Trajectory(Drawable):
         )
 
 
+_MOST_STEPS = 1e12  # of a run: they take days
 METHODS = ("auto", "dopri5", "dop853", "taylor", "rodas")
 """How steps may be taken."""
 
@@ -224,9 +225,21 @@ def tolerances(rtol: float, atol: float) -> tuple[float, float]:
     return rtol, atol
 
 
-def longest_step(max_step: float | None) -> float:
-    """A checked longest step, infinite where none is given."""
-    return math.inf if max_step is None else number("max_step", max_step, above=0.0)
+def longest_step(max_step: float | None, span: float = 0.0) -> float:
+    """Return a checked longest step, infinite if none is given, for a run of this length.
+
+    Raises
+    ------
+    ModelError
+        It is not positive, or the run would take days.
+    """
+    step = math.inf if max_step is None else number("max_step", max_step, above=0.0)
+    if step * _MOST_STEPS < span:
+        raise ModelError(
+            f"max_step is {step:.3g}: a run of {span:.3g} would take more than {_MOST_STEPS:.0e} such steps; "
+            "give a longer one"
+        )
+    return step
 
 
 def checked_times(t: ArrayLike) -> NDArray[np.float64] | float:
@@ -368,9 +381,9 @@ def integrated(
     """The same for who looks at the outcome: a run that leaves the disk is not warned of."""
     state = initial_state(model, state0)
     rtol, atol = tolerances(rtol, atol)
-    longest = longest_step(max_step)
-    stepper = method_for(model, method, rtol)
     times = checked_times(t)
+    longest = longest_step(max_step, times if isinstance(times, float) else float(np.ptp(times)))
+    stepper = method_for(model, method, rtol)
     model = driven(model, np.array([0.0, times]) if isinstance(times, float) else times, inputs)
     if isinstance(times, float):
         found = _core.simulate(model, None, times, state.tolist(), rtol, atol, longest, stepper, dense)

@@ -85,6 +85,7 @@ def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
     defaults = {"t": None, "tol": 2e-3 / time_scale, "transient": None, "rtol": 1e-8, "atol": 1e-10}
     chosen = _chosen(given, defaults)
     t, skipped = span(chosen["t"], chosen["transient"], longest=1e5 * time_scale, skip=400.0 * time_scale)
+    longest_step(chosen.get("max_step"), t)
     return {**chosen, "t": t, "tol": number("tol", chosen["tol"], above=0.0), "transient": skipped}
 
 
@@ -134,7 +135,9 @@ def _run_options(model: Model, given: Mapping[str, Any]) -> Options:
     chosen = _chosen(given, {"t": None, "rtol": 1e-9, "atol": 1e-12})
     if chosen["t"] is None:
         raise ModelError("the option t, the length of the runs, must be given")
-    return {**chosen, "t": number("t", chosen["t"], above=0.0)}
+    t = number("t", chosen["t"], above=0.0)
+    longest_step(chosen.get("max_step"), t)
+    return {**chosen, "t": t}
 
 
 def _outcome_variables(model: Model) -> tuple[Variable, ...]:
