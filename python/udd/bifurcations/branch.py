@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.labelled import of_states
-from udd._util.arguments import checked_arguments
 from udd.errors import ModelError
 from udd.models import Model
 

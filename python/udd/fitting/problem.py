@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
-from udd._util.drawable import Drawable
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed, renamed_attribute
 from udd.errors import FitError
 from udd.measurement import Measurement

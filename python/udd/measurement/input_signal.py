@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from udd._util.drawable import Drawable
 from udd._util.arguments import checked_arguments
+from udd._util.drawable import Drawable
 from udd.errors import MeasurementError
 
 __all__ = ["Hold", "InputSignal", "input_signals"]
