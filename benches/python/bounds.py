@@ -1,7 +1,8 @@
 """Bounds of errors against values of 30 digits and more: the error over the bound, none above 1.
 
 Periods by power series in decimal arithmetic and Newton's method, Hopf points by fractions, homoclinic orbits
-of the damped equations by power series from the unstable manifold of the saddle.
+of the damped equations by power series from the unstable manifold of the saddle. Points of codimension two,
+ends of branches, multipliers and coefficients by closed forms.
 """
 
 from __future__ import annotations
@@ -52,6 +53,92 @@ def hopf_points() -> list[float]:
         squared = (1 - b) / b
         turn = 2 * PI / (Decimal(squared.numerator) / Decimal(squared.denominator)).sqrt()
         found.append(row(f"its period at B = {B:g}", hopf.period, turn, hopf.period_error))
+    return found
+
+
+def special_points() -> list[float]:
+    """Of two conditions: cusps, Bogdanov-Takens and Bautin points with closed forms."""
+    found = []
+    for p2 in (10.0, 12.0, 14.0, 18.0, 20.0):
+        # A -> B in a stirred reactor: v = 2 and u = 1/2 at the cusp.
+        texts = ["-u + p1*(1 - u)*exp(v)", f"-v + p1*{p2}*(1 - u)*exp(v) - p3*v"]
+        model = udd.Model(["u", "v"], texts, {"p1": 0.01, "p3": p2 / 4 - 1.5})
+        rest = udd.equilibria(model, near=[0.05, 0.2])[0]
+        fold = udd.continuation(rest, "p1", (0.0, 1.0)).find("fold")[0]
+        curve = udd.locus(fold, "p3", (p2 / 4 - 1.6, p2 / 4), within=(0.0, 1.0))
+        (cusp,) = (point for point in curve.points if point.kind == "cusp")
+        known = Decimal(-2).exp(), Decimal(p2) / 4 - 1
+        for k, name in enumerate(cusp.parameters):
+            found.append(row(f"{name} of the cusp at p2 = {p2:g}", cusp.values[k], known[k], cusp.errors[k]))
+    c, d = 0.3, 0.7
+    plane = udd.Model(["x", "v"], ["v", f"x^2 - (m - {d}) + v*(b - {c} + x)"], {"b": 1.1, "m": 1.7})
+    rest = min(udd.equilibria(plane), key=lambda one: float(one.state[0]))
+    (hopf,) = udd.continuation(rest, "b", (-1.0, 3.0)).find("Hopf")
+    (takens,) = udd.locus(hopf, "m", (0.0, 3.0), within=(-1.0, 3.0)).points
+    square = "(x^2 + y^2)"
+    radial = f"(mu - {c} + (a - {d})*{square} - 0.7*{square}^2)"
+    wheel = udd.Model(["x", "y"], [f"x*{radial} - 2*y", f"y*{radial} + 2*x"], {"mu": 0.2, "a": 0.3})
+    (hopf,) = udd.continuation(udd.equilibria(wheel, near=[0.0, 0.0])[-1], "mu", (-0.2, 0.8)).find("Hopf")
+    (bautin,) = udd.locus(hopf, "a", (-0.3, 1.7), within=(-0.2, 0.8)).points
+    for point in (takens, bautin):
+        for k, name in enumerate(point.parameters):
+            at = Decimal((c, d)[k])
+            found.append(row(f"{name} of the {point.kind} point", point.values[k], at, point.errors[k]))
+    for name, value in takens.coefficients.items():
+        bound = takens.coefficient_errors[name]
+        found.append(row(f"coefficient {name} of the {takens.kind} point", value, Decimal(1), bound))
+    known = Decimal(-2) * Decimal(0.7)
+    bound = bautin.coefficient_errors["l2"]
+    found.append(row("coefficient l2 of the Bautin point", bautin.coefficients["l2"], known, bound))
+    return found
+
+
+def ends_of_branches() -> list[float]:
+    """Of Hopf points and pitchforks at which branches end, a fold of cycles and a saddle-node on a circle."""
+    found = []
+    for A in (0.8, 1.0, 1.3):
+        model = udd.Model(["x", "y"], ["A + x^2*y - (b + 1)*x", "b*x - x^2*y"], {"A": A, "b": 1.3 + A * A})
+        orbit = udd.periodic_orbit(model, [1.0, 2.0], settle=200.0)
+        (hopf,) = udd.continuation(orbit, "b", direction="down").find("Hopf")
+        known = 1 + Decimal(A) ** 2
+        found.append(row(f"Hopf point of the Brusselator at A = {A:g}", hopf.value, known, hopf.error))
+    for r in (0.61, 0.9, 2.0):
+        model = udd.Model(["x"], ["(r - 0.6)*x - x^3"], {"r": r})
+        side = max(udd.equilibria(model), key=lambda rest: float(rest.state[0]))
+        (point,) = udd.continuation(side, "r", (0.0, 3.0), direction="down").points
+        found.append(row(f"pitchfork from r = {r:g}", point.value, Decimal(0.6), point.error))
+    square = "(x^2 + y^2)"
+    for a in (0.4, 0.9):
+        radial = f"(mu + {a}*{square} - 0.7*{square}^2)"
+        wheel = udd.Model(["x", "y"], [f"x*{radial} - 2*y", f"y*{radial} + 2*x"], {"mu": 0.1})
+        orbit = udd.periodic_orbit(wheel, [1.0, 0.0], settle=100.0)
+        fold = udd.continuation(orbit, "mu", (-0.5, 0.5), direction="down").find("fold")[0]
+        known = -(Decimal(a) ** 2) / (4 * Decimal(0.7))
+        found.append(row(f"fold of cycles at a = {a:g}", fold.value, known, fold.error))
+        found.append(row(f"its period at a = {a:g}", fold.period, PI, fold.period_error))
+    radial = "(1 - x^2 - y^2)"
+    circle = udd.Model(["x", "y"], [f"x*{radial} - y*(3*m + x)", f"y*{radial} + x*(3*m + x)"], {"m": 0.5})
+    orbit = udd.periodic_orbit(circle, [1.0, 0.0])
+    snic = udd.connection(udd.continuation(orbit, "m", (0.1, 1.0), direction="down", max_period=200.0))
+    found.append(row("saddle-node on a circle", snic.value, Decimal(1) / 3, snic.error))
+    return found
+
+
+def numbers_of_solutions() -> list[float]:
+    """Of multipliers and first Lyapunov coefficients."""
+    found = []
+    radial = "(1 - x^2 - y^2)"
+    model = udd.Model(["x", "y", "u"], [f"x*{radial} - y", f"y*{radial} + x", "-0.3*u + x*(x^2 + y^2 - 1)"])
+    orbit = udd.periodic_orbit(model, [1.0, 0.0, 0.0])
+    for rate, value, bound in zip((0.3, 2.0), orbit.multipliers, orbit.multiplier_errors, strict=True):
+        known = (-2 * PI * Decimal(rate)).exp()
+        found.append(row(f"multiplier of the rate {rate:g}", float(value.real), known, float(bound)))
+    for bend in (0.5, 1.0, 3.0):
+        model = udd.Model(["x", "y"], ["y", f"-x + mu*y - {bend}*x^2*y"], {"mu": -0.3})
+        (hopf,) = udd.continuation(udd.equilibria(model)[0], "mu", (-1.0, 1.0)).find("Hopf")
+        known = -Decimal(bend) / 4
+        what = f"first Lyapunov coefficient at {bend:g}"
+        found.append(row(what, hopf.lyapunov_coefficient, known, hopf.lyapunov_error))
     return found
 
 
@@ -107,5 +194,6 @@ if __name__ == "__main__":
     PI = Decimal("3.14159265358979323846264338327950288419716939937510")
     print("| what | known | error | bound | error/bound |")
     print("|---|---|---|---|---|")
-    shares = [*periods(), *hopf_points(), *homoclinic_orbits()]
+    new = [*special_points(), *ends_of_branches(), *numbers_of_solutions()]
+    shares = [*periods(), *hopf_points(), *homoclinic_orbits(), *new]
     print(f"{len(shares)} numbers, the largest error over its bound {max(shares):.2f}")

@@ -35,6 +35,7 @@ _NODES = 12  # points of a curve about a pitchfork,
 _ENOUGH = 8  # of which so many at least
 _SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
 _NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
+_SHORT = 200  # pieces of a cycle up to which rounding is asked for
 _SURE = 2.0  # and how far beyond the largest scatter the error may lie
 
 
@@ -264,6 +265,13 @@ def location_error(
     here, _ = at(sigma)
     shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
     value, period = rounding_of(known) + np.abs(there - known) + np.abs(shift)
+    if curve.pieces <= _SHORT:
+        # Rounding is that of the largest numbers in the equations, which the value itself may not be.
+        near = np.array([-1.0, -0.5, 0.5, 1.0])
+        table, powers = np.array([at(sigma + _NEAR * step * x)[1] for x in near]), np.vander(near, 3)
+        fitted = np.linalg.lstsq(powers, table, rcond=None)[0]
+        noise = np.abs(powers @ fitted - table).max(axis=0) + np.abs(fitted[2] - known)
+        value, period = value + _SURE * noise[0], period + _SURE * noise[1]
     return float(value), float(period)
 
 
