@@ -87,7 +87,7 @@ def special_points() -> list[float]:
     for name, value in takens.coefficients.items():
         bound = takens.coefficient_errors[name]
         found.append(row(f"coefficient {name} of the {takens.kind} point", value, Decimal(1), bound))
-    known = Decimal(-2) * Decimal(0.7)
+    known = -2 * Decimal(d)
     bound = bautin.coefficient_errors["l2"]
     found.append(row("coefficient l2 of the Bautin point", bautin.coefficients["l2"], known, bound))
     return found
@@ -96,6 +96,7 @@ def special_points() -> list[float]:
 def ends_of_branches() -> list[float]:
     """Of Hopf points and pitchforks at which branches end, a fold of cycles and a saddle-node on a circle."""
     found = []
+    pitchfork, fifth = 0.6, 0.7  # as floats, which the models have
     for A in (0.8, 1.0, 1.3):
         model = udd.Model(["x", "y"], ["A + x^2*y - (b + 1)*x", "b*x - x^2*y"], {"A": A, "b": 1.3 + A * A})
         orbit = udd.periodic_orbit(model, [1.0, 2.0], settle=200.0)
@@ -106,14 +107,14 @@ def ends_of_branches() -> list[float]:
         model = udd.Model(["x"], ["(r - 0.6)*x - x^3"], {"r": r})
         side = max(udd.equilibria(model), key=lambda rest: float(rest.state[0]))
         (point,) = udd.continuation(side, "r", (0.0, 3.0), direction="down").points
-        found.append(row(f"pitchfork from r = {r:g}", point.value, Decimal(0.6), point.error))
+        found.append(row(f"pitchfork from r = {r:g}", point.value, Decimal(pitchfork), point.error))
     square = "(x^2 + y^2)"
     for a in (0.4, 0.9):
         radial = f"(mu + {a}*{square} - 0.7*{square}^2)"
         wheel = udd.Model(["x", "y"], [f"x*{radial} - 2*y", f"y*{radial} + 2*x"], {"mu": 0.1})
         orbit = udd.periodic_orbit(wheel, [1.0, 0.0], settle=100.0)
         fold = udd.continuation(orbit, "mu", (-0.5, 0.5), direction="down").find("fold")[0]
-        known = -(Decimal(a) ** 2) / (4 * Decimal(0.7))
+        known = -(Decimal(a) ** 2) / (4 * Decimal(fifth))
         found.append(row(f"fold of cycles at a = {a:g}", fold.value, known, fold.error))
         found.append(row(f"its period at a = {a:g}", fold.period, PI, fold.period_error))
     radial = "(1 - x^2 - y^2)"
