@@ -7,12 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from udd.discovery.validation.predictive_comparison import Foretelling
 
 import udd
 from udd.discovery.results import AddedEffect
 from udd.discovery.score_rounds import ScoreRound
 from udd.discovery.scoring.score_scan import Scan
-from udd.discovery.validation.predictive_comparison import Foretelling
 from udd.discovery.validation.sensor_drift import as_random, drift_gain
 from udd.fitting import fit_record, model_error_schedule, record_of
 

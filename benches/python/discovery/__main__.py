@@ -9,8 +9,9 @@ on the motion: torques in units of g Y, velocities in units of the drive, r.m.s.
 (no effect: a disk, a pendulum and a cart, whose sensors have steps, are slow, hum, drift, are read 1000 times
 a second, or whose support moves), "films" (no effect, by way of a film and the tracker), "machines"
 (simulated twins of real pendulums, sliders and the like, each under three sets of options), "driven"
-(machines with a measured input, their sensors quantised and slow; also without an effect). The limit is the
-amplitude at which chi2 is expected to fall by what it takes to be accepted. Drives, starts, devices, cameras,
+(machines with a measured input, their sensors quantised and slow; also without an effect), "near" (laws
+near the library, not in it: which claims are right?). The limit is the amplitude at which chi2 is expected to
+fall by what it takes to be accepted. Drives, starts, devices, cameras,
 laws, shapes and sizes are drawn from the seed, which was fixed before the first run. The generator shares no
 code with udd.
 """
@@ -34,10 +35,13 @@ import table
 from cases import BATCHES, cases
 from machined import MachineScore, machine_line, machine_report, machine_score
 from machines import machine_cases
+from near import NearScore, near_cases, near_line, near_report, near_score
 from scoring import Score, score
 
 #: Batches of machines: what is drawn, and how it is handed over.
 MACHINES = {"machines": (machines.KINDS, machines.OPTIONS), "driven": (driven_machines.KINDS, ("default",))}
+
+NAMES = (*BATCHES, *MACHINES, "near")
 
 SEED = 20261204
 
@@ -47,9 +51,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="discovery", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join((*BATCHES, *MACHINES))}"
-    )
+    parser.add_argument("--batches", default="three,foreign,pairs,nulls", help=f"of {', '.join(NAMES)}")
     parser.add_argument("--records", type=int, default=1, help="of each kind in each batch")
     parser.add_argument("--first", type=int, default=0, help="number of the first, to go on with a table")
     parser.add_argument("--only", default="", help="words of which a case's title must hold one")
@@ -62,35 +64,41 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write every record's score there too")
     given = parser.parse_args()
     batches = given.batches.split(",")
-    unknown = set(batches) - {*BATCHES, *MACHINES}
+    unknown = set(batches) - set(NAMES)
     if unknown:
-        parser.error(
-            f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join((*BATCHES, *MACHINES))}"
-        )
+        parser.error(f"there is no batch {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
     words = [word for word in given.only.split(",") if word]
     numbers = range(given.first, given.first + given.records)
-    wanted = [case for batch in batches if batch not in MACHINES for case in cases(batch, numbers)]
+    wanted = [case for batch in batches if batch in BATCHES for case in cases(batch, numbers)]
     wanted = [case for case in wanted if not words or any(word in case.title for word in words)]
     twins = [case for b in batches if b in MACHINES for case in machine_cases(numbers, *MACHINES[b])]
     twins = [case for case in twins if not words or any(word in case.label for word in words)]
+    nearby = [case for case in near_cases(numbers) if "near" in batches]
+    nearby = [case for case in nearby if not words or any(word in case.title for word in words)]
 
     scores: list[Score] = []
     twin_scores: list[MachineScore] = []
+    near_scores: list[NearScore] = []
     with ProcessPoolExecutor(given.jobs) as pool:
         jobs: list[Future[Any]] = [
             pool.submit(score, case, given.seed, given.duration, given.precise) for case in wanted
         ]
         jobs += [pool.submit(machine_score, case, given.seed) for case in twins]
+        jobs += [pool.submit(near_score, case, given.seed) for case in nearby]
         for job in as_completed(jobs):
             one = job.result()
             if isinstance(one, Score):
                 scores.append(one)
-            else:
+                said = table.line(one)
+            elif isinstance(one, MachineScore):
                 twin_scores.append(one)
-            said = table.line(one) if isinstance(one, Score) else machine_line(one)
+                said = machine_line(one)
+            else:
+                near_scores.append(one)
+                said = near_line(one)
             print(said, file=sys.stderr, flush=True)
             if given.json:
-                rows = [one.to_dict() for one in (*scores, *twin_scores)]
+                rows = [one.to_dict() for one in (*scores, *twin_scores, *near_scores)]
                 part = given.json.with_suffix(".part")
                 part.write_text(
                     json.dumps({"seed": given.seed, "duration_s": given.duration, "records": rows})
@@ -100,7 +108,9 @@ def main() -> int:
         print(table.report(scores))
     if twin_scores:
         print(machine_report(twin_scores))
-    return int(any(one.error for one in (*scores, *twin_scores)))
+    if near_scores:
+        print(near_report(near_scores))
+    return int(any(one.error for one in (*scores, *twin_scores, *near_scores)))
 
 
 if __name__ == "__main__":

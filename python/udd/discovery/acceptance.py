@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan
+from udd.discovery.symbolic.formulas import Formula, formulas_for, power_for, without
 from udd.discovery.validation.confirmation import Pair, confirmed_by, same_level
 from udd.discovery.validation.held_out_errors import (
     Errors,
@@ -21,28 +22,24 @@ from udd.discovery.validation.held_out_errors import (
     improvement,
     whole_improvement,
 )
-from udd.discovery.validation.predictive_comparison import Foretelling
 from udd.discovery.validation.sensor_drift import drift_gain
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, far_off, ran_away, released, started_at
+from udd.fitting import Fit, Record, at_level, eased, far_off, ran_away, refit, released, started_at
 from udd.fitting.parameters import Free
 
+from .hypotheses import Hypothesis, log_evidence, log_prior, ranked, rivals, spent
 from .results import Alternative
 from .score_rounds import ScoreRound
 from .thresholds import ALPHA, Confirmation
 from .time_budget import Clock
-from .trial_fits import TrialFit, fitted_ones, from_none, of_curve, of_formula, of_library, same_law
+from .trial_fits import TrialFit, fitted_ones, from_none, needed_in, of_curve, of_formula, of_library
 
-_SUPERSET = 0.95  # a form with more parameters and this likeness is the same form with more freedom
 _WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
 _DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion held, may be all there is
-#: In chi2: forms that differ by less are compared by all data and by what they foretell.
-_TIED = 4 * EVIDENCE_MARGIN
+_FORMULAS = 3  # for each curve, fitted in full
+_WIDE = 3  # times the margin, by which a form may be behind in the first part
 _ASTRAY = 1.5  # times the scatter of the first part, of all data: that fit may have ended elsewhere
-_FORETOLD = 0.9  # cost of held-out frames over another form's, below which forms of equal cost part
-#: Times chi2, by which what is held as stated may part forms: with it free, all data compare them.
-_BENT = 2.0
-_EQUALS = 10  # forms between which all data decide
+_COMPARED = 16  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -61,8 +58,12 @@ class Step:
     witness : {"held", "fitted", "halves"}
         What bears it out, see :func:`udd.discovery.validation.confirmation.confirmed_by`.
     alternatives : list of Alternative
-    price : float
-        What its freedom costs, in chi2; more for a formula, and for a curve, than for what physics knows.
+    formula : Formula or None
+        What the curve is written as.
+    names : list of str
+        The parameters that came in with it.
+    cost : float
+        What its log evidence pays, nats, for a spline's freedom and for its prior.
     """
 
     candidates: list[Candidate]
@@ -72,7 +73,9 @@ class Step:
     ratio: Ratio
     witness: Confirmation
     alternatives: list[Alternative]
-    price: float
+    formula: Formula | None
+    names: list[str]
+    cost: float
 
     @property
     def is_curve(self) -> bool:
@@ -90,11 +93,6 @@ class SearchState:
     part: Fit
     whole: Fit
     errors: Errors
-
-
-def _clearly(ratio: Ratio) -> bool:
-    """Whether one form foretells at less cost than another, beyond doubt and by an amount that matters."""
-    return ratio[0] < _FORETOLD and ratio[2] < 1.0
 
 
 def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tuple[Candidate, Candidate]]:
@@ -187,38 +185,17 @@ class Acceptance:
     def best(
         self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
     ) -> tuple[Step, SearchState] | None:
-        """The best trial that passes all tests."""
+        """The likeliest hypothesis, if it passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
-        if not trials:
-            return None
-        # chi2 compares only where the models are held equally tightly.
-        level = min(t.fit.level for t in trials)
-        trials = _compared(trials, level)
-        if not trials:
-            return None
-        first, before = min(trials, key=lambda t: t.compared.chi2).compared, at_level(current.part, level)
-        unit = first.inflation(before)
-        # Equal ones, like a slip and a relaxation at one drive, come in the library's order; what physics
-        # knows comes before a formula, and a formula before a curve, that fit about as well.
-        trials = sorted(trials, key=lambda t: round(t.criterion(unit) + t.prior_penalty, 3))
-        paid = {id(t): t.criterion(unit) + (t.prior_penalty if t.is_curve else 0.0) for t in trials}
-        near = [t for t in trials if paid[id(t)] - min(paid.values()) <= _TIED]
-        if not self.all_are_free(current.part):
-            near = [t for t in trials if t.compared.chi2 < _BENT * first.chi2]
-        near = self._once(near)
-        costs, wholes = self._costs(current, near[:_EQUALS], first.unit(before), unit)
-        near = sorted((t for t in near if id(t) in costs), key=lambda t: round(costs[id(t)], 3))
-        foretelling = Foretelling(current.whole.record, wholes, self.unit)
-        near = self._foretelling(near, costs, foretelling)
-        # Where the best form fails a test, a clearly worse one is not named instead.
-        for chosen in (t for t in near if costs[id(t)] - costs[id(near[0])] <= 2 * EVIDENCE_MARGIN):
-            trial = self._in_other_widths(current, chosen, scores.library)
+        order = ranked(self.hypotheses(current, trials, scores))
+        # Where the likeliest fails a test, a clearly less likely one is not named instead.
+        for chosen in (h for h in order if h.log_z >= order[0].log_z - EVIDENCE_MARGIN):
+            trial = self._in_other_widths(current, chosen.trial, scores.library)
             judged = self.judged(current, trial, scores)
             if judged is None or judged.witness is None:
                 continue
             errors = self.errors_or_none(trial.fit)
             if errors is not None and not self.worse(current.errors, errors):
-                others = self._alternatives(chosen, trials, scores.library, costs, foretelling)
                 step = Step(
                     candidates=trial.candidates,
                     curve=trial.curve,
@@ -226,11 +203,90 @@ class Acceptance:
                     p=judged.p,
                     ratio=judged.ratio,
                     witness=judged.witness,
-                    alternatives=others,
-                    price=trial.price + trial.prior_penalty,
+                    alternatives=self._alternatives(chosen, order, scores.library),
+                    formula=trial.formula,
+                    names=trial.names,
+                    cost=spent(trial) - chosen.prior,
                 )
                 return step, SearchState(trial.fit, judged.whole, errors)
         return None
+
+    def log_evidence(self, fitted: Fit, steps: Sequence[Step]) -> float:
+        """Log evidence of a fit of all data to which steps led, with the priors of these."""
+        names = [name for step in steps for name in step.names]
+        cost = sum(step.cost for step in steps)
+        return log_evidence(self._at_own_noise(fitted), names) - cost
+
+    def hypotheses(
+        self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
+    ) -> list[Hypothesis]:
+        """The likeliest proposals, each fitted to all data at its own noise and model error."""
+        terms = len(scores.library.scored) + len(scores.curves)
+
+        def first(trial: TrialFit) -> float:
+            try:
+                return log_evidence(eased(trial.fit), trial.names) - spent(trial)
+            except FitError:
+                return -math.inf
+
+        evidence = self.clock.each(first, trials)
+        most = max(evidence, default=0.0)
+        likely = sorted((t for t in zip(evidence, trials, strict=True)), key=lambda pair: -pair[0])
+        near = [t for z, t in likely if z > most - _WIDE * EVIDENCE_MARGIN][:_COMPARED]
+
+        def whole(trial: TrialFit) -> Hypothesis | None:
+            try:
+                again = self._again(current, trial)
+                if again is None or not again.needed:
+                    return None
+                return Hypothesis(trial, again, self._at_own_noise(again.fit), log_prior(trial, terms))
+            except FitError:
+                return None
+
+        def wholes(some: Sequence[TrialFit]) -> list[Hypothesis]:
+            return [h for h in self.clock.each(whole, some) if h is not None]
+
+        result = wholes(near)
+        result += wholes(self._written(current, ranked(result)))
+        return result + wholes(self._shortened(current, ranked(result)))
+
+    def _at_own_noise(self, fitted: Fit) -> Fit:
+        """A fit at its own noise and model error, with all free that the user leaves free."""
+        return refit(self._all_free(fitted), trusted=True)
+
+    def _written(self, current: SearchState, order: Sequence[Hypothesis]) -> list[TrialFit]:
+        """Formulas for the likely splines, as all data show them.
+
+        A velocity with its momentum and without is tried by each other's formulas too: as splines they look
+        nearly the same, and a formula may be found for one of them only.
+        """
+        least = order[0].log_z - 2 * EVIDENCE_MARGIN if order else 0.0
+        curves = [h.again.curve for h in order if h.trial.is_curve and h.log_z > least and h.again.curve]
+        sought = [(curve, self._formulas(current.whole, curve)) for curve in curves]
+        pairs: dict[tuple[tuple[str, ...], str], tuple[Curve, Formula]] = {}
+        for curve, _own in sought:
+            for other, formulas in sought:
+                if other.kin == curve.kin:
+                    pairs |= {(curve.name, f.text): (curve, f) for f in formulas}
+        some = list(pairs.values())
+        if some:
+            self.clock.tell(f"trying {some[0][1].text}" + (f" and {len(some) - 1} more" if some[1:] else ""))
+        return fitted_ones(self.clock.each(lambda pair: of_formula(current.part, *pair), some))
+
+    def _shortened(self, current: SearchState, order: Sequence[Hypothesis]) -> list[TrialFit]:
+        """The likeliest formula without each of its amplitudes that the data do not need."""
+        best = order[0].again if order else None
+        if best is None or best.curve is None or best.formula is None:
+            return []
+        needless = [name for name in best.names if not needed_in(order[0].whole, [name])]
+        shorter = [without(best.formula, name.rpartition(".")[2]) for name in needless]
+        return fitted_ones([of_formula(current.part, best.curve, f) for f in shorter if f is not None])
+
+    def _formulas(self, fitted: Fit, curve: Curve) -> list[Formula]:
+        taken, number = fitted.model.state_names, fitted.observations
+        formulas = formulas_for(curve, number, taken=taken).formulas[:_FORMULAS]
+        power = power_for(curve, number, taken) if len(curve.coordinates) == 1 else None
+        return [*formulas, power] if power is not None else formulas
 
     def _in_other_widths(self, current: SearchState, trial: TrialFit, scanned: Scan) -> TrialFit:
         """Several effects at once, with every width of those that turn over one: a fit may be stuck at it.
@@ -249,59 +305,6 @@ class Acceptance:
         level = trial.fit.level
         some = [trial, *(t for t in found if t.fit.level >= level and t.needed)]
         return min(_compared(some, level), key=lambda t: t.compared.chi2, default=trial)
-
-    def _once(self, near: list[TrialFit]) -> list[TrialFit]:
-        """Without formulas that are one of the library's laws in other words."""
-        # Without this "friction = a |Omega| |Omega|" is told as an alternative to quadratic drag.
-        known = [t for t in near if t.curve is None]
-        return [
-            t
-            for t in near
-            if t.formula is None or not any(same_law(t.compared, other.compared) for other in known)
-        ]
-
-    def _foretelling(
-        self, near: list[TrialFit], costs: dict[int, float], foretelling: Foretelling
-    ) -> list[TrialFit]:
-        """Forms in order of their cost, but first one of about equal cost that foretells clearly better."""
-        # Without this a cubic drag stands for a pendulum's quadratic drag and dry friction.
-        best = near[0] if near else None
-        for other in near[1:]:
-            tied = costs[id(other)] - costs[id(near[0])] <= _TIED
-            if best and tied and _clearly(foretelling.ratio(best, other)):
-                best = other
-        return [best, *(t for t in near if t is not best)] if best else near
-
-    def _costs(
-        self, current: SearchState, near: list[TrialFit], unit: float, most: float
-    ) -> tuple[dict[int, float], dict[int, TrialFit]]:
-        """What each of several forms costs that explain the first part about as well: by all data; the fits.
-
-        Forms that tie in the first part may part on the rest. By Dawid's prequential argument the criterion
-        of all data is, but for a constant, the cost of predicting each stretch from those before it.
-        """
-        if len(near) < 2:
-            return {id(t): t.criterion(unit) + t.prior_penalty for t in near if t.needed}, {}
-
-        def again(trial: TrialFit) -> TrialFit | None:
-            try:
-                whole = self._again(current, trial)
-                return whole and replace(whole, fit=self._all_free(whole.fit))
-            except FitError:
-                return None
-
-        pairs = zip(near, self.clock.each(again, near), strict=True)
-        wholes = [(t, w) for t, w in pairs if w is not None and w.needed]
-        level = min((w.fit.level for _t, w in wholes), default=0)
-        result = {}
-        for trial, whole in wholes:
-            try:
-                # What no library has is not chosen for fitting what the noise is not sure to show.
-                paid = trial.price + trial.prior_penalty * (most / unit if trial.curve else 1.0)
-                result[id(trial)] = float(at_level(whole.fit, level).chi2 / unit + paid)
-            except FitError:
-                continue
-        return result, {id(t): w for t, w in wholes}
 
     def all_are_free(self, fitted: Fit) -> bool:
         """Whether everything is free that the user leaves free, as where a search begins it may not be."""
@@ -370,54 +373,26 @@ class Acceptance:
             improvement(before, after, h)[1] > _WORSE for h in before.horizons
         )
 
-    def _says_less(self, formula: TrialFit, chosen: TrialFit, nats: float) -> bool:
-        """Whether a formula is the chosen law in other words, or has more constants for nothing."""
-        # Without this a formula beside dry friction leaves the verdict at "form not identified".
-        return same_law(formula.compared, chosen.compared) or (
-            nats > 0 and len(formula.names) > len(chosen.names)
-        )
-
     def _alternatives(
-        self,
-        chosen: TrialFit,
-        trials: list[TrialFit],
-        scanned: Scan,
-        costs: dict[int, float],
-        foretelling: Foretelling,
+        self, chosen: Hypothesis, order: Sequence[Hypothesis], scanned: Scan
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
-
-        def cost(trial: TrialFit) -> float:  # a formula may be it as well as what was chosen
-            return costs[id(trial)] - trial.prior_penalty
-
-        best = cost(chosen)
-        for trial in (t for t in trials if id(t) in costs):
-            nats = (cost(trial) - best) / 2
-            if (
-                trial is chosen
-                or nats > EVIDENCE_MARGIN
-                or len(trial.candidates) != len(chosen.candidates)
-                or trial.is_curve
-                or (trial.formula is not None and self._says_less(trial, chosen, nats))
-                or _clearly(foretelling.ratio(trial, chosen))
-            ):
-                continue
-            for mine, other in _beside(chosen.candidates, trial.candidates):
-                if other.title == mine.title:
+        for other in rivals(chosen, order, [f.name for f in self.free if f.role == "model"]):
+            for mine, theirs in _beside(chosen.trial.candidates, other.trial.candidates):
+                if theirs.title == mine.title:
                     continue  # but for the width that its sign is smoothed over
-                known = mine in listed and other in listed
-                likeness = scanned.likeness(listed.index(mine), listed.index(other)) if known else 0.0
-                if likeness > _SUPERSET and other.parameters > mine.parameters:
-                    continue  # the chosen form with something more that the data do not ask for
-                named = {p: f"{other.effect.name}.{p}" for p in other.effect.parameters}
-                fitted = trial.fit.parameters
-                effect = other.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
+                known = mine in listed and theirs in listed
+                likeness = scanned.likeness(listed.index(mine), listed.index(theirs)) if known else 0.0
+                named = {p: f"{theirs.effect.name}.{p}" for p in theirs.effect.parameters}
+                fitted = other.again.fit.parameters
+                effect = theirs.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
+                nats = chosen.log_z - other.log_z
                 one = Alternative(
-                    mine.effect.name, effect, other.title, other.effect.equation, nats, likeness
+                    mine.effect.name, effect, theirs.title, theirs.effect.equation, nats, likeness
                 )
                 # The same may stand beside several partners; the best is told.
-                key = (mine.effect.name, other.title, other.effect.momentum)
+                key = (mine.effect.name, theirs.title, theirs.effect.momentum)
                 if key not in result or nats < result[key].nats:
                     result[key] = one
         return list(result.values())

@@ -15,6 +15,7 @@ from udd._util.expressions import Expression
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
+from udd.discovery.symbolic.expressions import is_single_term
 from udd.discovery.validation.by_record import by_record
 from udd.discovery.validation.held_camera import camera_shows
 from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
@@ -46,7 +47,7 @@ from .results import AddedEffect, Discovery, RejectedEffect
 from .search import Search, both
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
-from .verdict import verdict_of
+from .verdict import doubts_of, verdict_of
 
 #: The share of the record that effects are sought in; the rest is held out.
 TRAIN = 0.6
@@ -229,7 +230,8 @@ def discover(
         except TimeUpError as up:
             stopped = stopped or str(up)
     open_form = doubtful or left or random or excused is not None or unexplained
-    verdict = verdict_of(found, final, bool(end.unconfirmed), bool(open_form), bool(stopped))
+    doubts = doubts_of(found, told, ratio, int(record.part(~train).observed.sum())) if found else []
+    verdict = verdict_of(found, bool(end.unconfirmed), doubts, bool(open_form), bool(stopped))
     return Discovery(
         verdict=verdict,
         baseline=baseline.without_cache().doubted() if found else told,
@@ -252,6 +254,7 @@ def discover(
         random=random.doubts.missed if random else [],
         held_out=tuple(sorted(order[len(order) - apart :])),
         undetermined=tuple(near),
+        doubts=doubts,
     )
 
 
@@ -383,6 +386,7 @@ def _describe(step: Step, final: Fit) -> list[AddedEffect]:
                 ratio=step.ratio,
                 witness=step.witness,
                 curve=step.curve,
+                is_law=step.curve is None or (step.formula is not None and is_single_term(step.formula.node)),
                 tried=candidate.title,
             )
         )

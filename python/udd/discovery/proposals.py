@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.look_alikes import look_alikes
 from udd.discovery.scoring.score_scan import Scored
-from udd.discovery.symbolic.formulas import Formula, formulas_for
 from udd.effects.user_defined import along_of
 from udd.fitting import Fit, Goal
 
@@ -25,7 +23,6 @@ from .trial_fits import (
     fitted_ones,
     from_none,
     of_curve,
-    of_formula,
     of_library,
     one_of_each,
     with_more,
@@ -35,7 +32,7 @@ _EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is mis
 _TRIED = 12  # of the best candidates, fitted in full
 _ALIKE = 6  # more of them, that do nearly the same as the best
 _TOGETHER = 6  # pairs that may pass only together
-_FORMULAS = 3  # for each curve, fitted in full
+_COORDINATES = 4  # over which curves are located
 _HOPELESS = 2.0  # times the chi2 of the best fit: one above it that does not converge is given up
 _PAIRED = 4  # of the effects that are scored best, of which all pairs are fitted in full
 
@@ -71,26 +68,33 @@ class Proposals:
     def effects(self) -> tuple[list[TrialFit], set[str]]:
         """What the library has, one effect or two, and the names of those with which the model does worse.
 
-        What physics knows comes first: as long as something else is missing too, a curve bends to explain a
-        part of that. Once effects of the library explain the data, formulas compete with them.
+        Curves over the coordinates that score as well are located beside them, and their formulas.
         """
         passing = self.scores.passing()
-        curve = next((c for c in states_first(self.scores.curves) if len(c.coordinates) == 1), None)
-        with ThreadPoolExecutor(1) as beside:  # a search in Python beside fits in the core
-            sought = beside.submit(self._formulas, curve) if curve and passing else None
-            trials = self._singles(passing)
+        trials = self._singles(passing)
         trials += self._look_alikes(trials)
         # With these the model cannot even be held as tightly as without: nor with another one beside.
         tight = [t for t in trials if t.fit.level >= self.fit.level]
         loose = {t.candidates[0].effect.name for t in trials} - {t.candidates[0].effect.name for t in tight}
-        if curve and sought and trials and min(t.fit.scatter for t in trials) < _EXPLAINED:
-            # Formulas that may explain the data as well as what the library has.
-            known = max(self.scores.nats(s) for s in passing)
-            rivals = [f for f in sought.result() if curve.evidence + f.nats > known - EVIDENCE_MARGIN]
-            trials += self._written(curve, rivals, self._beside(trials))
-        if trials and (self.fit.model.profile.discovery.pairs or any(t.formula for t in trials)):
+        if trials:
+            trials += self.curves(self._near_curves())
+        if trials and (self.fit.model.profile.discovery.pairs or any(t.curve for t in trials)):
             trials += self._pairs(loose, tight)
         return trials, loose
+
+    def _near_curves(self) -> list[Curve]:
+        """The likeliest curves, over each coordinate that scores about as well as the best.
+
+        A score around a wrong model does not tell one coordinate from another that turns with it. The
+        friction as a function of the speed is among them, for drags are its rivals.
+        """
+        single = [c for c in states_first(self.scores.curves) if len(c.coordinates) == 1]
+        if not single:
+            return []
+        near = [c for c in single if c.evidence > single[0].evidence - EVIDENCE_MARGIN]
+        near += [c for c in single if c.name == ("friction", "|Omega|") and c not in near]
+        kinds = list(dict.fromkeys(c.kin for c in near))[:_COORDINATES]
+        return [c for c in near if c.kin in kinds]
 
     def only_together(self, loose: set[str]) -> tuple[list[TrialFit], int]:
         """Two effects at once that may pass only together, but for the `loose`, and of how many pairs."""
@@ -105,20 +109,9 @@ class Proposals:
         return self._together(likely), number
 
     def curves(self, likely: list[Curve]) -> list[TrialFit]:
-        """Curves, as splines and by short formulas.
-
-        A velocity with its momentum and without is tried by each other's formulas too: as splines they look
-        nearly the same, and a formula may be found for one of them only.
-        """
+        """Curves, located as splines."""
         self._trying([curve.title for curve in likely])
-        located = fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely))
-        written = [(one, one.curve, self._formulas(one.curve)) for one in located if one.curve is not None]
-        trials: list[TrialFit] = []
-        for one, curve, own in written:
-            kin = [f for _o, c, formulas in written if c.kin == curve.kin for f in formulas]
-            forms = {f.text: f for f in (*own, *kin)}
-            trials += [one, *self._written(curve, list(forms.values())[:_FORMULAS], self._beside([one]))]
-        return trials
+        return fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely))
 
     def tried(self, some: list[Scored]) -> list[TrialFit]:
         """Candidates fitted in full, from the amplitudes that the score foretells."""
@@ -153,15 +146,6 @@ class Proposals:
     def _in_full(self, some: list[tuple[Candidate, list[float]]], goal: Goal | None = None) -> list[TrialFit]:
         """Candidates fitted in full, each from its amplitudes."""
         return fitted_ones(self.clock.each(lambda one: of_library(self.fit, [one[0]], one[1], goal), some))
-
-    def _formulas(self, curve: Curve) -> list[Formula]:
-        taken = self.fit.model.state_names
-        return formulas_for(curve, self.fit.observations, taken=taken).formulas[:_FORMULAS]
-
-    def _written(self, curve: Curve, formulas: list[Formula], goal: Goal | None) -> list[TrialFit]:
-        """Formulas for a curve, fitted."""
-        self._trying([f.text for f in formulas])
-        return fitted_ones(self.clock.each(lambda one: of_formula(self.fit, curve, one, goal), formulas))
 
     def _pairs(self, loose: set[str], singles: list[TrialFit]) -> list[TrialFit]:
         """Two effects at once, of those that the scores rank first, to compare with one and with formulas.

@@ -55,6 +55,8 @@ class AddedEffect:
     curve : Curve or None
         Where it was located without a formula: the curve with its band. The effect is that, or a formula
         for it.
+    is_law : bool
+        Whether it is a term of the library, or of the user, a power, or a formula of one term.
     tried : str
         What it was called as a candidate, with the shape and the frequency that it was tried with.
     by_record : list of RecordAnswer
@@ -72,6 +74,7 @@ class AddedEffect:
     ratio: Ratio
     witness: Confirmation
     curve: Curve | None = None
+    is_law: bool = True
     tried: str = ""
     by_record: list[RecordAnswer] = field(default_factory=list)
 
@@ -237,6 +240,8 @@ class Discovery:
         `split` is the time in the first measurement from which pictures show free runs.
     undetermined : tuple of str
         Parameters that the data do not determine, held near what was stated.
+    doubts : list of str
+        What speaks against naming the form of what was found, in sentences.
     """
 
     verdict: str
@@ -260,6 +265,7 @@ class Discovery:
     random: list[ModelError] = field(default_factory=list)
     held_out: tuple[int, ...] = ()
     undetermined: tuple[str, ...] = ()
+    doubts: list[str] = field(default_factory=list)
 
     looks = renamed_attribute("looks", "comparisons")
     refused = renamed_attribute("refused", "rejected")
@@ -323,7 +329,7 @@ class Discovery:
     @property
     def remarks(self) -> list[str]:
         """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
-        said = [sentence(title, answers) for title, answers in self.by_record]
+        said = [sentence(title, answers) for title, answers in self.by_record] + self.doubts
         said += [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
         if doubt := self.fit.unit_doubt:
             said.append(f"{doubt[0].upper()}{doubt[1:]}. The fit is that of the numbers as stated.")
@@ -342,11 +348,6 @@ class Discovery:
             said.append(
                 "Forces that push at random, like those of a support that moves, explain this record about "
                 f"as well; beside what was found it still needs {needed}, r.m.s. over a frame."
-            )
-        if any(effect.like_a_drift(self.fit.model) for effect in self.effects):
-            said.append(
-                "What was found is a function of time alone; so is the zero of a sensor that drifts, from "
-                "which one record does not tell it."
             )
         if any(effect.curve is not None for effect in self.effects):
             said += [

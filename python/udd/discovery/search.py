@@ -11,7 +11,6 @@ from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.by_record import by_record, contested
-from udd.discovery.validation.confirmation import same_level
 from udd.discovery.validation.held_out_errors import (
     Errors,
     confirmed,
@@ -20,11 +19,9 @@ from udd.discovery.validation.sensor_drift import as_random
 from udd.errors import FitError
 from udd.fitting import (
     Fit,
-    at_level,
     ran_away,
     released_anew,
     started_at,
-    with_noise_of,
 )
 
 from .acceptance import Acceptance, SearchState, Step
@@ -47,16 +44,6 @@ def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
         return (work(part),) * 2
     one, other = parallel_map(work, (part, whole))
     return one, other
-
-
-def _cheaper(
-    found: tuple[Step, SearchState], steps: Sequence[Step], start: SearchState, end: SearchState
-) -> bool:
-    """Whether one step explains the data as well as several from the same start, their freedom paid for."""
-    step, state = found
-    one, several = same_level(with_noise_of(state.part, end.part), end.part)
-    unit = one.inflation(at_level(start.part, one.level))
-    return one.chi2 / unit + step.price < several.chi2 / unit + sum(s.price for s in steps)
 
 
 @dataclass(frozen=True)
@@ -290,10 +277,19 @@ class Search:
         if found is None:
             return False
         found = found[0], self._released(found[1], anew=True)
-        if not _cheaper(found, accepted[k:], before, states[-1]):
+        if not self._likelier(found, accepted[k:], states[-1]):
             return False
         accepted[k:], states[k + 1 :], rounds[k + 1 :] = [found[0]], [found[1]], []
         return True
+
+    def _likelier(self, found: tuple[Step, SearchState], steps: Sequence[Step], end: SearchState) -> bool:
+        """Return True if one step has a larger log evidence than several from the same start."""
+        step, state = found
+        try:
+            one = self.tests.log_evidence(state.whole, [step])
+            return one > self.tests.log_evidence(end.whole, steps)
+        except FitError:
+            return False
 
     def _leave_out(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
         """Leave out effects of the library that chance explains beside those found after them.
@@ -319,7 +315,7 @@ class Search:
             if found is None:
                 continue
             found = found[0], self._released(found[1])
-            if not _cheaper(found, later, states[k], states[-1]):
+            if not self._likelier(found, later, states[-1]):
                 continue
             left = {c.effect.name for c in kept}
             others = [a for s in later for a in s.alternatives if a.instead_of in left]

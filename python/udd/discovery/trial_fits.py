@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from udd._util import chi_squared
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import physical
 from udd.discovery.symbolic.formulas import Formula
@@ -20,8 +20,6 @@ from udd.models.formula_model import FormulaModel
 
 from .curve_effects import fit_curve, fit_formula
 from .thresholds import ALPHA
-
-_DIFFERENT = 0.02  # of the noise: laws whose fits differ by less are the same
 
 
 def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
@@ -85,22 +83,6 @@ class TrialFit:
     def is_curve(self) -> bool:
         """Whether it is a curve without a formula."""
         return self.curve is not None and self.formula is None
-
-    def criterion(self, unit: float) -> float:
-        """chi2 in a common unit with the price of the freedom: the smaller the better."""
-        return self.compared.chi2 / unit + self.price
-
-    @property
-    def prior_penalty(self) -> float:
-        """By how much chi2 must be better than that of an effect of the library.
-
-        Of several at once as much as a further one has to bring beyond its price.
-        """
-        if self.curve is None:
-            return EVIDENCE_MARGIN * (
-                sum(not c.usual for c in self.candidates) + 2 * (len(self.candidates) - 1)
-            )
-        return 3 * EVIDENCE_MARGIN if self.formula is None else 2 * EVIDENCE_MARGIN
 
     @property
     def needed(self) -> bool:
@@ -216,12 +198,6 @@ def one_of_each(trials: list[TrialFit]) -> list[TrialFit]:
         fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
         found.setdefault((effect.name, effect.momentum, *fixed), trial)
     return [trial for trial in trials if trial in found.values()]
-
-
-def same_law(one: Fit, other: Fit) -> bool:
-    """Whether two models make the same motion: one law in other words."""
-    sd = one.noise.sd(one.record, one.states[:, 0])
-    return bool(np.nanmax(np.abs(one.misfit - other.misfit) / sd) < _DIFFERENT)
 
 
 def _unused(current: Fit, name: str) -> str:

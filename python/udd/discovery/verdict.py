@@ -4,26 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.validation.by_record import contested
-from udd.effects.user_defined import is_spline
+from udd.discovery.validation.held_out_errors import Ratio
 from udd.fitting import Fit
 from udd.fitting.diagnostics import readings
 
 from .results import AddedEffect
 
+_SIZE = 0.98  # of the held-out error, below which a gain has a size
+_DETERMINED = 3.0  # standard errors
+
 
 def verdict_of(
-    found: Sequence[AddedEffect], final: Fit, unconfirmed: bool, open_form: bool, stopped: bool
+    found: Sequence[AddedEffect], unconfirmed: bool, doubts: Sequence[str], open_form: bool, stopped: bool
 ) -> str:
     """The first that holds of these, from what is least to what is most sure.
 
     Parameters
     ----------
     found : sequence of AddedEffect
-    final : Fit
-        With them, of all data.
     unconfirmed : bool
         Whether something was found in the first part that free runs over the rest do not confirm.
+    doubts : sequence of str
+        What speaks against naming the form of what was found, see :func:`doubts_of`.
     open_form : bool
         Whether another form explains as much, or what is left or the known model's misfit is no noise.
     stopped : bool
@@ -31,18 +37,69 @@ def verdict_of(
     """
     if not found and unconfirmed:
         return "fits the first part, not confirmed"
-    if open_form or _is_no_law(found, final):
+    if open_form or doubts:
         return "effect present, form not identified"
     if found:
         return "effect identified"
     return "search not finished" if stopped else "nothing missing"
 
 
-def _is_no_law(found: Sequence[AddedEffect], final: Fit) -> bool:
-    """Whether something found is wanted by some records only, has no formula, or may be a sensor's."""
-    return (
-        any(contested(f.by_record) for f in found)
-        or any(is_spline(f.effect) or f.like_a_drift(final.model) for f in found)
-        # A sensor that reads in coarse steps makes curves, too.
-        or (any(f.curve is not None for f in found) and any(one.coarse for one in readings(final)))
-    )
+def doubts_of(found: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: int) -> list[str]:
+    """What speaks against naming the form of what was found, in sentences; empty where nothing does.
+
+    Parameters
+    ----------
+    found : sequence of AddedEffect
+    final : Fit
+        With them, of all data.
+    ratio : tuple of float
+        Held-out error of free runs after over before, with its interval.
+    held_out : int
+        How many numbers were held out.
+    """
+    result = []
+    for one in found:
+        if contested(one.by_record):
+            result.append(f"Only some of the records want {one.title}.")
+        if one.like_a_drift(final.model):
+            result.append(f"{one.title} may be the drift of a sensor's zero.")
+        if not one.is_law:
+            result.append(f"{one.title} is a curve, written as a formula: no law of one term.")
+        elif open_constants := undetermined(one, final):
+            result.append(f"{one.title}: the data do not determine {', '.join(open_constants)}.")
+    # A sensor that reads in coarse steps makes curves, too.
+    if any(one.curve is not None for one in found) and any(one.coarse for one in readings(final)):
+        result.append("A sensor reads in coarse steps, and such errors make curves too.")
+    if found and not has_size(ratio) and not any(_predicts(one.ratio, held_out) for one in found):
+        result.append("Held-out data gain less than 2 %, and less than 10 nats.")
+    return result
+
+
+def has_size(ratio: Ratio) -> bool:
+    """Return True if held-out errors fall beyond doubt, and by at least 2 %."""
+    return ratio[2] < 1.0 and ratio[0] <= _SIZE
+
+
+def _predicts(cost: Ratio, held_out: int) -> bool:
+    """Return True if the held-out frames become likelier beyond doubt, and by at least 10 nats."""
+    return cost[2] < 1.0 and held_out * (1.0 / max(cost[0], 1e-300) - 1.0) / 2 >= EVIDENCE_MARGIN
+
+
+def undetermined(one: AddedEffect, final: Fit) -> list[str]:
+    """Constants of an effect that are within three standard errors of zero.
+
+    Amplitudes that stand together, as those of a sine and a cosine, count as one.
+    """
+    order = list(final.parameters)
+    result = []
+    amplitudes = [p for p in one.effect.amplitudes if f"{one.effect.name}.{p}" in order]
+    groups = [amplitudes, *([p] for p in one.errors if p not in amplitudes)]
+    for group in filter(None, groups):
+        rows = [order.index(f"{one.effect.name}.{p}") for p in group]
+        values = np.array([one.parameters[p] for p in group])
+        block = final.covariance[np.ix_(rows, rows)]
+        if np.linalg.matrix_rank(block) < len(rows) or (
+            values @ np.linalg.solve(block, values) < _DETERMINED**2
+        ):
+            result += group
+    return result

@@ -458,17 +458,18 @@ def _with_free(fitted: Fit, free: Sequence[Free]) -> Problem:
     return replace(fitted.problem, free=(*free, *added))
 
 
-def refit(fitted: Fit) -> Fit:
+def refit(fitted: Fit, *, trusted: bool = False) -> Fit:
     """The same model fitted again, the noise estimated anew, and held as tightly as is likeliest.
 
-    In a search the noise stays as the first model showed it, so that chi2 compares.
+    In a search the noise stays as the first model showed it, so that chi2 compares. The noise of a film whose
+    geometry is not `trusted` stays as it was assumed.
     """
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     misfits: Misfits = "little"
     point = fitted.point
     try:
-        if not _least(fitted.measurements, search=True) > _FINEST:
+        if trusted or not _least(fitted.measurements, search=True) > _FINEST:
             misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
         if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point

@@ -238,10 +238,6 @@ class Fit(Drawable):
         """
         return max(self.scatter, 1.0) * self._colour(before)
 
-    def unit(self, before: Fit) -> float:
-        """The same for choosing between forms: the scatter counts as it shows, see :attr:`shown`."""
-        return self.shown * self._colour(before)
-
     @cached_property
     def shown(self) -> float:
         """The scatter, at least 1 where the noise was known; how forms are told apart.

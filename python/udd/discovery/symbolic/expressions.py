@@ -34,6 +34,7 @@ _UNARY: dict[str, Callable[[Any], Any]] = {
     "ln": np.log,
     "abs": np.abs,
     "sqrt": np.sqrt,
+    "ramp": lambda value: np.maximum(value, 0.0),
 }
 _RANK = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4}
 
@@ -248,6 +249,45 @@ def price(node: Node) -> float:
     return len(own) * math.log(max(len(set(own)), 2))
 
 
+def length(node: Node) -> int:
+    """How many operations, functions and variables a formula has."""
+    return sum(part[0] not in ("n", "c") for part in parts(node))
+
+
+def is_power(node: Node) -> bool:
+    """Return True if a formula is a constant times a power of its coordinate with a free exponent."""
+    if node[0] != "*" or node[1][0] != "c" or node[2][0] != "^":
+        return False
+    base, exponent = node[2][1:]
+    return base in (("x",), ("abs", ("x",))) and exponent[0] == "c"
+
+
+def is_single_term(node: Node) -> bool:
+    """Return True if a formula is one term: a factor times one function of its coordinate, or one wave.
+
+    No operation joins two parts that both have the coordinate in them, but for the sine and the cosine of one
+    angle, and no constant stands beside the term.
+    """
+    if node[0] in ("+", "-"):
+        return {_wave(part) for part in node[1:]} in ({("sin", n), ("cos", n)} for n in _angles(node))
+    return not any(len(part) == 3 and all(_varies(p) for p in part[1:]) for part in parts(node))
+
+
+def _varies(node: Node) -> bool:
+    return X in parts(node)
+
+
+def _angles(node: Node) -> list[Node]:
+    return [part[1] for part in parts(node) if part[0] in ("sin", "cos")]
+
+
+def _wave(node: Node) -> tuple[str, Node] | None:
+    """The function and the angle of a constant times a sine or a cosine."""
+    if node[0] == "*" and not _varies(node[1]) and node[2][0] in ("sin", "cos"):
+        return node[2][0], node[2][1]
+    return None
+
+
 def shape(node: Node) -> str:
     """The formula without its constants' values, to tell equal ones by."""
     return write(node, "x", dict.fromkeys(constants(node), "c"))
@@ -267,6 +307,8 @@ def _text(node: Node, variable: str, names: dict[int, str]) -> tuple[str, int]:
         return f"{node[1]:.10g}", 5 if node[1] >= 0 else 0
     if kind == "c":
         return names[node[1]], 5
+    if kind == "ramp":
+        return f"max({_text(node[1], variable, names)[0]}, 0)", 5
     if kind in _UNARY:
         return f"{kind}({_text(node[1], variable, names)[0]})", 5
     rank = _RANK[kind]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from udd.discovery.nonparametric.curve_scan import Curve
 
-from .expressions import Node, constants, read, scaled, simplify
+from .expressions import Node, X, constants, read, scaled, simplify
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,18 @@ def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
             texts += [f"{size} * sin({b} * x)" for b in (1.0, 2.0, 3.0)]
     for text, beside in itertools.product(texts, ("", f" + {size}")):
         yield _read_fixed(text + beside)
+    if not spline.periodic:
+        for share in (0.2, 0.4, 0.6):  # nothing below a threshold, then in proportion
+            yield ("*", ("c", 0), ("ramp", ("-", X, ("c", 1)))), [size / span, float(low) + share * span]
+
+
+def powers(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
+    """A power of the coordinate's size, from several exponents."""
+    x = curve.places[0]
+    size = float(np.abs(curve.values(np.quantile(x, (0.1, 0.5, 0.9)))).max()) or 1.0
+    most = float(np.abs(np.quantile(x, (0.01, 0.99))).max()) or 1.0
+    for exponent in (0.3, 0.7, 1.0, 1.5, 2.0):
+        yield _read_fixed(f"{size / most**exponent} * abs(x)^{exponent}")
 
 
 def _read_fixed(text: str) -> tuple[Node, list[float]]:

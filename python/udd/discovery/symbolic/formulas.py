@@ -28,7 +28,7 @@ from .expressions import (
     without_sign,
     write,
 )
-from .formula_proposals import regression, usual
+from .formula_proposals import powers, regression, usual
 
 Array = NDArray[np.float64]
 
@@ -60,6 +60,8 @@ class Formula:
         By how much the formula, its length and constants paid for, is more likely than the smooth curve.
     node : tuple
         See :mod:`udd.discovery.symbolic.expressions`.
+    variable : str
+        What its coordinate is called.
     """
 
     text: str
@@ -67,6 +69,7 @@ class Formula:
     amplitudes: tuple[str, ...]
     nats: float
     node: Node
+    variable: str
 
     def values(self, x: Array) -> Array:
         """The formula at places of the curve's coordinate."""
@@ -127,6 +130,47 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
     best = max((one.nats for one in formulas), default=-math.inf)
     return Formulas(
         [one for one in formulas if one.nats > best - EVIDENCE_MARGIN], best > -EVIDENCE_MARGIN, note
+    )
+
+
+def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> Formula | None:
+    """Fit a power with a free exponent to a curve; None where none can be fitted.
+
+    It is the rival of every law that grows with its coordinate.
+
+    Parameters
+    ----------
+    curve, observations, taken
+        As for :func:`formulas_for`.
+    """
+    target = _Target(curve, observations)
+    positive = curve.coordinates[0].name in _POSITIVE
+    trials = []
+    for node, values in powers(curve):
+        fitted = target.fit(without_sign(node) if positive else node, values)
+        if fitted is not None:
+            trials.append(fitted)
+    best = max(trials, key=lambda one: one.nats, default=None)
+    return best and _formula(curve, best, [name for name in _NAMES if name not in taken])
+
+
+def without(formula: Formula, name: str) -> Formula | None:
+    """Return a formula without the term of one of its amplitudes; None where nothing would be left."""
+    names = list(formula.parameters)
+    values = list(formula.parameters.values())
+    if name not in formula.amplitudes:
+        return None
+    node = simplify(put(formula.node, names.index(name), 0.0), values)
+    left = [names[k] for k in constants(node) if k < len(names)]
+    if not left or len(left) != len(constants(node)) or not amplitudes(node):
+        return None
+    order = {names.index(one): k for k, one in enumerate(left)}
+    shorter = _renumbered(node, order)
+    linear = tuple(one for one in left if order[names.index(one)] in amplitudes(shorter))
+    variable = formula.variable
+    text = write(shorter, variable, dict(enumerate(left)))
+    return Formula(
+        text, {one: formula.parameters[one] for one in left}, linear, formula.nats, shorter, variable
     )
 
 
@@ -253,7 +297,8 @@ def _formula(curve: Curve, fitted: _Fitted, free: Sequence[str]) -> Formula:
     text = write(fitted.node, own.text, names)
     parameters = {names[number]: fitted.values[number] for number in numbers}
     linear = tuple(names[number] for number in numbers if number in amplitudes(fitted.node))
-    return Formula(text, parameters, linear, fitted.nats - curve.evidence, _renumbered(fitted.node, order))
+    nats = fitted.nats - curve.evidence
+    return Formula(text, parameters, linear, nats, _renumbered(fitted.node, order), own.text)
 
 
 def _renumbered(node: Node, order: dict[int, int]) -> Node:

@@ -1,0 +1,215 @@
+"""Hypotheses as data, and the criterion that ranks them: their log evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.symbolic.expressions import is_power, length
+from udd.effects import Effect
+from udd.errors import ModelError
+from udd.fitting import Fit
+from udd.models import Model
+
+from .trial_fits import TrialFit
+
+Array = NDArray[np.float64]
+
+_SYMBOL = math.log(12)  # nats: a formula's symbol is one of so many operations and functions
+_PLACES = 400  # of a motion, at which laws are compared
+_EQUAL = 1e-2  # of a law's size: two that differ by less are one
+_STEP = 1e-5  # of a parameter, by which differences are taken
+
+
+def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
+    """Laplace approximation of the log evidence, with unit-information priors.
+
+    The states are integrated out, and so are the parameters. A parameter without a prior of its own gets one
+    that carries as much information as one number of the record does (Kass and Wasserman 1995).
+
+    Parameters
+    ----------
+    fitted : Fit
+    names : sequence of str
+        The parameters without a prior of their own that the hypothesis adds to the known model.
+    """
+    if not names:
+        return fitted.evidence
+    order = list(fitted.parameters)
+    rows = [order.index(name) for name in names]
+    covariance = fitted.covariance[np.ix_(rows, rows)] / fitted.widened**2
+    sign, size = np.linalg.slogdet(covariance)
+    if sign <= 0:
+        return -math.inf
+    return float(fitted.evidence - size / 2 - len(rows) * math.log(fitted.observations) / 2)
+
+
+def spent(trial: TrialFit) -> float:
+    """Nats that the freedom of a spline costs, whose coefficients a fit holds."""
+    return trial.price / 2 if trial.is_curve else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A law or several, fitted to the first part of a record and to all of it.
+
+    Attributes
+    ----------
+    trial, again : TrialFit
+        What was proposed, fitted to the first part and to all data.
+    whole : Fit
+        Of all data, at its own most probable noise and model error.
+    prior : float
+        Logarithm of its prior probability: that of one term among all, or of a formula of its length.
+    """
+
+    trial: TrialFit
+    again: TrialFit
+    whole: Fit
+    prior: float
+
+    @cached_property
+    def log_z(self) -> float:
+        """Log evidence of all data, less what a curve's freedom costs, with the prior."""
+        return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior
+
+    @property
+    def constants(self) -> int:
+        """How many numbers were found for it."""
+        return max(len(self.trial.names), sum(c.parameters for c in self.trial.candidates))
+
+
+def log_prior(trial: TrialFit, terms: int) -> float:
+    """Logarithm of a proposal's prior probability, where the library has so many terms.
+
+    A term of the library is one of these, and a power counts as one. A formula costs the nats that it takes
+    to write it down, and its coordinate. A spline says less than a law: it leads if it is far better.
+    """
+    single = -math.log(terms)
+    if trial.formula is not None:
+        return single - (0.0 if is_power_drag(trial) else _SYMBOL * length(trial.formula.node))
+    unusual = sum(not c.usual for c in trial.candidates)
+    return len(trial.candidates) * single - EVIDENCE_MARGIN * (trial.is_curve + unusual / 2)
+
+
+def is_power_drag(trial: TrialFit) -> bool:
+    """Return True if a proposal is friction that grows with a power of the speed."""
+    if trial.formula is None or trial.curve is None or not is_power(trial.formula.node):
+        return False
+    return trial.curve.slot.name == "friction" and trial.curve.coordinates[0].name == "|Omega|"
+
+
+def contains(law: Hypothesis, other: Hypothesis, known: Sequence[str]) -> bool:
+    """Return True if one law can do what another one does, along the motion that was fitted with it.
+
+    The law's constants are fitted to the other one's rates by least squares. What the parameters of the known
+    model can do is left out.
+
+    Parameters
+    ----------
+    law, other : Hypothesis
+    known : sequence of str
+        Names of the known model's free parameters.
+    """
+    first = other.whole.record.film == 0
+    t, states = other.whole.record.t[first], other.whole.states[first]
+    some = np.linspace(0, len(t) - 1, min(len(t), _PLACES)).astype(int)
+    t, states = t[some], states[some]
+    model = other.whole.model
+    plain = model.with_effects(model.effects[: len(model.effects) - len(other.trial.candidates)])
+    without = plain.rates(t, states)
+    basis = _span(plain, [name for name in known if name in plain.parameters], t, states)
+
+    def left(rates: Array) -> Array:
+        work = (rates - without).ravel()
+        result: Array = work - basis @ (basis.T @ work)
+        return result
+
+    target = left(model.rates(t, states))
+    size = float(np.linalg.norm(target))
+    effects = law.whole.model.effects[len(law.whole.model.effects) - len(law.trial.candidates) :]
+    start = {f"{e.name}.{p}": e.parameters[p] for e in effects for p in e.parameters}
+    varied = [name for name in start if name in law.whole.parameters]
+    if not (size > 0 and varied):
+        return False
+    base = plain.with_effects((*plain.effects, *effects))
+    scale = np.array([abs(start[name]) or 1.0 for name in varied])
+
+    def residual(x: Array) -> Array:
+        try:
+            tried = base.with_parameters(dict(zip(varied, (x * scale).tolist(), strict=True)))
+            off = (left(tried.rates(t, states)) - target) / size
+        except ModelError:
+            return np.full(target.shape, 1e3)
+        return np.where(np.isfinite(off), off, 1e3)
+
+    for begin in _starts(effects, start, varied):
+        try:
+            solved = least_squares(residual, begin / scale, max_nfev=30 * (len(varied) + 1))
+        except ValueError:
+            continue
+        if np.linalg.norm(solved.fun) < _EQUAL:
+            return True
+    return False
+
+
+def _starts(effects: Sequence[Effect], values: Mapping[str, float], varied: Sequence[str]) -> Iterator[Array]:
+    """The fitted constants, and the same with each shape at the ends of its range.
+
+    A law may become another one only there, as Stribeck's friction becomes dry friction.
+    """
+    yield np.array([values[name] for name in varied])
+    for effect in effects:
+        for p in effect.spec.parameters:
+            name = f"{effect.name}.{p.name}"
+            for end in p.range if p.role == "shape" and name in varied else ():
+                if np.isfinite(end):
+                    yield np.array([end if other == name else values[other] for other in varied])
+
+
+def _span(model: Model, names: Sequence[str], t: Array, states: Array) -> Array:
+    """Orthonormal basis of the changes of a model's rates with its parameters, (n d, p)."""
+    rates, columns = model.rates(t, states).ravel(), [np.zeros(states.size)]
+    for name in names:
+        step = _STEP * (abs(model.parameters[name]) or 1.0)
+        moved = model.with_parameters({name: model.parameters[name] + step})
+        columns.append((moved.rates(t, states).ravel() - rates) / step)
+    basis: Array = np.linalg.qr(np.stack(columns[bool(names) :], axis=-1))[0]
+    return basis
+
+
+def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The hypotheses in order of their log evidence, the best first; ties in the order that they came in."""
+    return sorted(hypotheses, key=lambda h: -round(h.log_z, 3))
+
+
+def rivals(
+    chosen: Hypothesis, others: Sequence[Hypothesis], known: Sequence[str], margin: float = EVIDENCE_MARGIN
+) -> list[Hypothesis]:
+    """The hypotheses that the data cannot tell from the chosen one.
+
+    Those within `margin` nats of it, but no spline beside a law, nothing that the chosen one contains, and
+    nothing that contains the chosen one with more constants and does not gain by them.
+    """
+    result = []
+    for other in others:
+        if other is chosen or other.log_z < chosen.log_z - margin:
+            continue
+        if other.trial.is_curve:
+            if chosen.trial.is_curve:
+                result.append(other)
+            continue
+        wider = other.constants > chosen.constants
+        if wider and other.log_z <= chosen.log_z and contains(other, chosen, known):
+            continue
+        if not wider and other.trial.formula is not None and contains(chosen, other, known):
+            continue  # the chosen law in other words
+        result.append(other)
+    return result

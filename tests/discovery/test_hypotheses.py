@@ -1,0 +1,275 @@
+"""The criterion: log evidence, priors, containment and rivals, on small tables of ready fits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import udd
+from udd.discovery import hypotheses
+from udd.discovery.hypotheses import Hypothesis, contains, log_evidence, log_prior, ranked, rivals
+from udd.discovery.results import AddedEffect
+from udd.discovery.scoring.candidate import Candidate
+from udd.discovery.symbolic.expressions import is_power, is_single_term, length, read
+from udd.discovery.verdict import doubts_of, has_size, undetermined, verdict_of
+from udd.fitting import extend, fit_record, record_of, refit
+
+QUADRATIC = udd.effects.quadratic_drag(c=0.01)
+CUBIC = udd.effects.cubic_drag(c=0.01)
+COULOMB = udd.effects.coulomb(c=0.002)
+
+
+def power(n: float, a: float = 0.01) -> udd.effects.Effect:
+    return udd.effects.formula("friction", "a*abs(Omega)^n", amplitudes=["a"], name="power", a=a, n=n)
+
+
+def node(text: str) -> Any:
+    return read(text, {"x": ("x",)})[0]
+
+
+@dataclass
+class Trial:
+    """What :mod:`udd.discovery.hypotheses` asks of a trial."""
+
+    candidates: list[Candidate]
+    names: list[str]
+    formula: Any = None
+    curve: Any = None
+    price: float = 0.0
+
+    @property
+    def is_curve(self) -> bool:
+        return self.curve is not None and self.formula is None
+
+
+def trial(*laws: udd.effects.Effect, formula: str = "", curve: Any = None) -> Trial:
+    names = [f"{law.name}.{p}" for law in laws for p in law.amplitudes]
+    written = SimpleNamespace(node=node(formula)) if formula else None
+    return Trial([Candidate(law, law.title) for law in laws], names, written, curve)
+
+
+def motion(*laws: udd.effects.Effect) -> Any:
+    """A swing with laws, as a fit of it shows it."""
+    t = np.arange(0, 20, 0.02)
+    states = np.column_stack([3.0 * np.exp(-t / 20) * np.sin(4.4 * t), np.exp(-t / 20) * np.cos(4.4 * t)])
+    model = udd.Pendulum(0.5, k0=0.01, effects=list(laws))
+    record = SimpleNamespace(film=np.zeros(len(t), int), t=t)
+    return SimpleNamespace(model=model, record=record, states=states, parameters=dict(model.parameters))
+
+
+def hypothesis(log_z: float, *laws: udd.effects.Effect, **written: Any) -> Hypothesis:
+    """A hypothesis with a given log evidence."""
+    proposed: Any = trial(*laws, **written)
+    result = Hypothesis(proposed, proposed, motion(*laws), 0.0)
+    result.__dict__["log_z"] = log_z
+    return result
+
+
+KNOWN = ["k0", "length", "inertia"]
+
+
+@pytest.mark.parametrize(
+    ("law", "other", "expected"),
+    [
+        (power(1.2), QUADRATIC, True),  # |Omega|^1 |Omega|
+        (QUADRATIC, power(1.2), False),
+        (CUBIC, QUADRATIC, False),
+        (COULOMB, QUADRATIC, False),
+        (udd.effects.stribeck(c=0.002, fade=3.7), COULOMB, True),  # where it fades at 20 rad/s
+        (COULOMB, udd.effects.stribeck(c=0.002, fade=3.7), False),
+    ],
+)
+def test_a_free_power_contains_a_drag_and_no_drag_another(law, other, expected):
+    assert contains(hypothesis(0.0, law), hypothesis(0.0, other), KNOWN) is expected
+
+
+def test_two_drags_contain_each_of_them():
+    both = hypothesis(0.0, QUADRATIC, COULOMB)
+    assert contains(both, hypothesis(0.0, QUADRATIC), KNOWN)
+    assert not contains(hypothesis(0.0, QUADRATIC), both, KNOWN)
+
+
+def test_what_the_known_model_can_do_is_left_out():
+    """Friction that is constant is the known one: a power of it can be anything."""
+    assert contains(hypothesis(0.0, QUADRATIC), hypothesis(0.0, power(0.0)), ["k0"]) is False
+    shifted = udd.effects.formula("friction", "a*(abs(Omega) + 3)", amplitudes=["a"], a=0.01)
+    assert contains(hypothesis(0.0, QUADRATIC), hypothesis(0.0, shifted), ["k0"])
+    assert not contains(hypothesis(0.0, QUADRATIC), hypothesis(0.0, shifted), [])
+
+
+def test_hypotheses_come_in_order_of_their_log_evidence():
+    table = [hypothesis(z, QUADRATIC) for z in (3.0, 8.0, 8.0004, -1.0)]
+    assert [h.log_z for h in ranked(table)] == [8.0, 8.0004, 3.0, -1.0]  # ties as they came in
+
+
+def test_rivals_are_what_lies_within_ten_nats():
+    chosen = hypothesis(100.0, QUADRATIC)
+    near, far = hypothesis(91.0, CUBIC), hypothesis(89.0, COULOMB)
+    assert rivals(chosen, [chosen, near, far], KNOWN) == [near]
+
+
+def test_a_wider_law_is_a_rival_only_if_it_gains():
+    chosen = hypothesis(100.0, QUADRATIC)
+    wider = hypothesis(97.0, QUADRATIC, COULOMB)
+    assert rivals(chosen, [wider], KNOWN) == []
+    gains = hypothesis(101.0, QUADRATIC, COULOMB)
+    assert rivals(chosen, [gains], KNOWN) == [gains]
+
+
+def test_the_chosen_law_in_other_words_is_no_rival():
+    again = udd.effects.formula("friction", "a*abs(Omega)", amplitudes=["a"], a=0.01)
+    assert rivals(hypothesis(100.0, QUADRATIC), [hypothesis(99.0, again, formula="1*x")], KNOWN) == []
+
+
+def test_a_spline_is_a_rival_of_splines_alone():
+    spline = hypothesis(99.0, QUADRATIC, curve=SimpleNamespace())
+    assert rivals(hypothesis(100.0, CUBIC), [spline], KNOWN) == []
+    assert rivals(hypothesis(100.0, CUBIC, curve=SimpleNamespace()), [spline], KNOWN) == [spline]
+
+
+def test_priors_count_terms_symbols_and_splines():
+    single = -math.log(30)
+    over_speed = SimpleNamespace(
+        slot=SimpleNamespace(name="friction"), coordinates=[SimpleNamespace(name="|Omega|")]
+    )
+    assert log_prior(trial(QUADRATIC), 30) == single  # type: ignore[arg-type]
+    assert log_prior(trial(QUADRATIC, COULOMB), 30) == 2 * single  # type: ignore[arg-type]
+    assert log_prior(trial(QUADRATIC, curve=over_speed), 30) == single - 10.0  # type: ignore[arg-type]
+    free = trial(power(1.2), formula="1.0*x^1.2", curve=over_speed)
+    assert log_prior(free, 30) == single  # type: ignore[arg-type]
+    wave = trial(power(1.2), formula="1.0*sin(2.0*x)", curve=over_speed)
+    assert log_prior(wave, 30) == pytest.approx(single - 4 * math.log(12))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("text", "single", "symbols"),
+    [
+        ("2.0*x^1.5", True, 3),
+        ("2.0*exp(3.0*x)", True, 4),
+        ("2.0*x + 1.0*x^3", False, 6),
+        ("1.0 + 2.0*tanh(3.0*x)", False, 5),
+        ("2.0*sin(0.3*x)*abs(tanh(1.5*x) - 0.27*x)", False, 12),
+    ],
+)
+def test_a_single_term_has_its_coordinate_on_one_side(text, single, symbols):
+    assert is_single_term(node(text)) is single
+    assert length(node(text)) == symbols
+    assert is_power(node(text)) is (text == "2.0*x^1.5")
+
+
+@pytest.mark.parametrize(("n", "single"), [(3.0, True), (2.0, False)])
+def test_the_sine_and_the_cosine_of_one_angle_are_one_term(n, single):
+    def wave(name: str, factor: float, number: int) -> Any:
+        return ("*", ("c", number), (name, ("*", ("n", factor), ("x",))))
+
+    assert is_single_term(("+", wave("sin", 3.0, 0), wave("cos", n, 1))) is single
+
+
+def test_log_evidence_of_a_fit_with_a_drag_is_near_the_information_criterion():
+    """Kass and Wasserman: with unit information the evidence is BIC's, up to terms of order one."""
+    t = np.arange(0, 30, 0.05)
+    truth = udd.Pendulum(1.0, k0=0.01, effects=[udd.effects.quadratic_drag(c=0.02)])
+    theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
+    noise = 3e-3 * np.random.default_rng(3).standard_normal(len(t))
+    measured = udd.Measurement(t, {"theta": theta + noise})
+    record = record_of(measured)
+    plain = fit_record(measured, record, udd.Pendulum(1.0, k0=0.01), search=True)
+    right = extend(plain, [udd.effects.quadratic_drag()], [0.0])
+    idle = extend(right, [udd.effects.constant_torque()], [0.0])
+    names = ["quadratic_drag.c"]
+    without, one, two = refit(plain), refit(right), refit(idle)
+    assert log_evidence(one, names) > log_evidence(without, []) + 50
+    lost = log_evidence(one, names) - log_evidence(two, [*names, "constant_torque.c"])
+    # What a number that is not needed costs: half the logarithm of the record's numbers, less a chi2 of 1.
+    assert math.log(len(t)) / 2 - 3.5 < lost < math.log(len(t)) / 2 + 1.0
+
+
+def added(effect: udd.effects.Effect, **more: Any) -> AddedEffect:
+    values: dict[str, Any] = {
+        "effect": effect,
+        "title": effect.title,
+        "equation": effect.equation,
+        "expression": effect.expression,
+        "parameters": dict(effect.parameters),
+        "errors": dict.fromkeys(effect.amplitudes, 0.1),
+        "chi2": 100.0,
+        "p": 1e-9,
+        "ratio": (0.5, 0.4, 0.6),
+        "witness": "held",
+    }
+    return AddedEffect(**(values | more))
+
+
+def final(**values: tuple[float, float]) -> Any:
+    """A fit of which only the numbers count."""
+    order = {name.replace("__", "."): value for name, (value, _sd) in values.items()}
+    covariance = np.diag([sd**2 for _value, sd in values.values()])
+    return SimpleNamespace(parameters=order, covariance=covariance, model=udd.Disk(0.04))
+
+
+def test_a_constant_within_three_standard_errors_is_not_determined():
+    effect = udd.effects.quadratic_drag(c=0.01)
+    assert undetermined(added(effect), final(quadratic_drag__c=(0.01, 0.004))) == ["c"]
+    assert undetermined(added(effect), final(quadratic_drag__c=(0.01, 0.002))) == []
+
+
+def test_the_amplitudes_of_a_wave_count_together():
+    wave = udd.effects.eccentric_mass(a=0.01, b=0.0)
+    numbers = final(eccentric_mass__a=(0.01, 0.001), eccentric_mass__b=(0.0, 0.001))
+    assert undetermined(added(wave), numbers) == []
+
+
+@pytest.mark.parametrize(
+    ("ratio", "size"), [((0.9, 0.8, 0.97), True), ((0.99, 0.985, 0.998), False), ((0.9, 0.7, 1.1), False)]
+)
+def test_a_gain_has_a_size_of_two_per_cent_at_least(ratio, size):
+    assert has_size(ratio) is size
+
+
+def test_each_doubt_leaves_the_form_open(monkeypatch):
+    monkeypatch.setattr("udd.discovery.verdict.readings", lambda _fit: [])
+    effect, numbers = udd.effects.quadratic_drag(c=0.01), final(quadratic_drag__c=(0.01, 0.001))
+    clear, gain = added(effect), (0.5, 0.4, 0.6)
+    assert doubts_of([clear], numbers, gain, 1000) == []
+    assert "no law of one term" in doubts_of([added(effect, is_law=False)], numbers, gain, 1000)[0]
+    weak = final(quadratic_drag__c=(0.01, 0.01))
+    assert "do not determine c" in doubts_of([clear], weak, gain, 1000)[0]
+    # Where free runs gain little the frames' own likelihood may show it: 1000 numbers at half their cost.
+    assert doubts_of([clear], numbers, (0.99, 0.98, 1.01), 1000) == []
+    little = added(effect, ratio=(0.99, 0.98, 1.01))
+    assert "less than 10 nats" in doubts_of([little], numbers, (0.99, 0.98, 1.01), 1000)[0]
+
+
+@pytest.mark.parametrize(
+    ("effects", "unconfirmed", "doubts", "open_form", "stopped", "verdict"),
+    [
+        (True, False, [], False, False, "effect identified"),
+        (True, False, ["a doubt"], False, False, "effect present, form not identified"),
+        (True, False, [], True, False, "effect present, form not identified"),
+        (False, False, [], True, False, "effect present, form not identified"),
+        (False, True, [], False, False, "fits the first part, not confirmed"),
+        (False, False, [], False, True, "search not finished"),
+        (False, False, [], False, False, "nothing missing"),
+    ],
+)
+def test_the_verdict_is_the_least_sure_that_holds(effects, unconfirmed, doubts, open_form, stopped, verdict):
+    some = [added(QUADRATIC)] if effects else []
+    assert verdict_of(some, unconfirmed, doubts, open_form, stopped) == verdict
+
+
+def test_unit_information_has_a_covariance():
+    """Amplitudes that trade for each other determine nothing: such a hypothesis is never the likeliest."""
+    fit: Any = SimpleNamespace(
+        evidence=5.0,
+        parameters={"a": 1.0, "b": 1.0},
+        covariance=np.ones((2, 2)),
+        widened=1.0,
+        observations=99,
+    )
+    assert log_evidence(fit, ["a", "b"]) == -math.inf
+    assert hypotheses.log_evidence(fit, []) == 5.0
