@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from udd.discovery.validation.predictive_comparison import Foretelling
 
 import udd
 from udd.discovery.results import AddedEffect
@@ -64,22 +63,6 @@ def test_what_forces_at_random_explain_as_well_is_told_from_a_drag(shake, drag):
     )
     assert known.level == found.level and known.chi2 - found.chi2 > 30  # either looks like a finding
     assert (as_random(known, found) is not None) == bool(shake)
-
-
-def test_several_splits_of_time_part_a_drag_from_another():
-    measured = swinging(0.0, 3e-2)
-    record = record_of(measured)
-    laws = [udd.effects.quadratic_drag(c=1e-2), udd.effects.cubic_drag(c=1e-2)]
-    models = [udd.Pendulum(0.8, k0=0.004, effects=[law]) for law in laws]
-    right, wrong = (SimpleNamespace(fit=fit_record(measured, record, m, search=True)) for m in models)
-    foretelling = Foretelling(record, {id(right): right, id(wrong): wrong}, 1.0)
-    assert foretelling.ratio(wrong, right)[2] < 1.0 < foretelling.ratio(right, wrong)[1]
-    assert foretelling.ratio(right, right) == (1.0, 1.0, 1.0)
-    # Each split has fits of its own.
-    spans = [np.ptp(one.record.t) for one in foretelling._fits(right)]
-    np.testing.assert_allclose(spans, [36.0, 42.0, 48.0], atol=0.05)
-    few = record.part(slice(20))
-    assert np.isnan(Foretelling(few, foretelling.wholes, 1.0).ratio(wrong, right)[0])
 
 
 def test_a_search_takes_a_fit_that_is_near_its_minimum():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import udd
+from udd.discovery.hypotheses import log_prior
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.natural_modes import belongs, modes
 from udd.discovery.trial_fits import TrialFit
@@ -98,12 +99,12 @@ def test_two_frictions_are_found_together_where_one_would_do_for_the_first_part(
 
 
 def test_mere_products_and_several_terms_pay_more():
-    """A formula pays two units of ten nats, as does a second term; a product of states one."""
+    """A product of states pays five nats, and each further term the choice of it."""
     usual, odd = (c for c in library(SPRING) if c.title in ("v^3 in v'", "x*v^2 in v'"))
     order = sorted([usual, odd], key=lambda c: not c.usual)
 
-    def prior_penalty(candidates):
-        return TrialFit(candidates, None, None, [], 0.0, 1).prior_penalty  # type: ignore[arg-type]
+    def prior(candidates):
+        return log_prior(TrialFit(candidates, None, None, [], 0.0, 1), 20)  # type: ignore[arg-type]
 
-    assert [prior_penalty([c]) for c in order] == [0.0, 10.0]
-    assert prior_penalty(order) == 30.0
+    assert [prior([c]) for c in order] == pytest.approx([-np.log(20), -np.log(20) - 5.0])
+    assert prior(order) == pytest.approx(-2 * np.log(20) - 5.0)

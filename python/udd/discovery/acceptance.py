@@ -24,7 +24,7 @@ from udd.discovery.validation.held_out_errors import (
 )
 from udd.discovery.validation.sensor_drift import drift_gain
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, eased, far_off, ran_away, refit, released, started_at
+from udd.fitting import Fit, Record, at_level, eased, far_off, ran_away, refit, released_anew, started_at
 from udd.fitting.parameters import Free
 
 from .hypotheses import Hypothesis, log_evidence, log_prior, ranked, rivals, spent
@@ -39,7 +39,8 @@ _DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion 
 _FORMULAS = 3  # for each curve, fitted in full
 _WIDE = 3  # times the margin, by which a form may be behind in the first part
 _ASTRAY = 1.5  # times the scatter of the first part, of all data: that fit may have ended elsewhere
-_COMPARED = 16  # forms between which all data decide
+_BENT = 3.0  # times the least scatter, by which what is held as stated may part forms
+_COMPARED = 12  # forms between which all data decide
 
 
 @dataclass(frozen=True)
@@ -206,7 +207,7 @@ class Acceptance:
                     alternatives=self._alternatives(chosen, order, scores.library),
                     formula=trial.formula,
                     names=trial.names,
-                    cost=spent(trial) - chosen.prior,
+                    cost=log_evidence(chosen.whole, chosen.again.names) - chosen.log_z,
                 )
                 return step, SearchState(trial.fit, judged.whole, errors)
         return None
@@ -229,10 +230,15 @@ class Acceptance:
             except FitError:
                 return -math.inf
 
-        evidence = self.clock.each(first, trials)
-        most = max(evidence, default=0.0)
-        likely = sorted((t for t in zip(evidence, trials, strict=True)), key=lambda pair: -pair[0])
-        near = [t for z, t in likely if z > most - _WIDE * EVIDENCE_MARGIN][:_COMPARED]
+        if self.all_are_free(current.part):
+            evidence = self.clock.each(first, trials)
+            most = max(evidence, default=0.0) - _WIDE * EVIDENCE_MARGIN
+            likely = sorted(zip(evidence, trials, strict=True), key=lambda pair: -pair[0])
+            near = [trial for z, trial in likely if z > most]
+        else:  # what is held as stated bends forms: only with it free, and all data, do they compare
+            least = min((t.fit.scatter for t in trials), default=0.0)
+            near = sorted((t for t in trials if t.fit.scatter < _BENT * least), key=lambda t: t.fit.scatter)
+        near = [trial for trial in trials if trial in near[:_COMPARED]]
 
         def whole(trial: TrialFit) -> Hypothesis | None:
             try:
@@ -320,7 +326,7 @@ class Acceptance:
         if self.all_are_free(fitted):
             return fitted
         try:
-            found = released(fitted, self.free)
+            found = released_anew(fitted, self.free)
         except FitError:
             return fitted
         return found if found.converged and found.level >= fitted.level and not ran_away(found) else fitted

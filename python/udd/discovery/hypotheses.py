@@ -77,8 +77,17 @@ class Hypothesis:
 
     @cached_property
     def log_z(self) -> float:
-        """Log evidence of all data, less what a curve's freedom costs, with the prior."""
-        return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior
+        """Log evidence of all data, less what a curve's freedom costs, with the prior.
+
+        A film's geometry is not sure to the noise that shows: a curve or a formula pays as if that were what
+        a film's is taken to be at least, while laws of the library are told apart by what shows.
+        """
+        unsure = 0.0
+        if self.trial.curve is not None:
+            # Without this a drag of a real pendulum's film is taken for a curve, by its geometry's faults.
+            fitted = self.again.fit
+            unsure = (self.prior - spent(self.again)) * (max(fitted.scatter, 1.0) / fitted.shown - 1.0)
+        return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior + unsure
 
     @property
     def constants(self) -> int:
@@ -186,8 +195,13 @@ def _span(model: Model, names: Sequence[str], t: Array, states: Array) -> Array:
 
 
 def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses in order of their log evidence, the best first; ties in the order that they came in."""
-    return sorted(hypotheses, key=lambda h: -round(h.log_z, 3))
+    """The hypotheses in order of their log evidence, the best first.
+
+    Those that are behind by the same number of nats tie: they keep the order that they came in, as a slip and
+    a relaxation do, which are one and the same at one drive.
+    """
+    most = max((h.log_z for h in hypotheses), default=0.0)
+    return sorted(hypotheses, key=lambda h: round(most - h.log_z))
 
 
 def rivals(

@@ -160,6 +160,13 @@ class Proposals:
                 first.setdefault(one.candidate.effect.name, one.candidate)
         best = list(first.values())[:_PAIRED]
         pairs = [list(pair) for pair in itertools.combinations(best, 2)]
+        # What is best alone may only hide the rest: with it each of those that score best and brake.
+        leader = min(singles, key=lambda t: (-t.fit.level, t.fit.chi2 + t.price), default=None)
+        usable = list(dict.fromkeys(first.get(s.candidate.effect.name) for s in self.scores.usable()))
+        for other in filter(None, usable[:_PAIRED]):
+            pair = [leader.candidates[0], other] if leader else []
+            if pair and pair[0] is not other and pair not in pairs and pair[::-1] not in pairs:
+                pairs.append(pair)
         # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
         alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
         pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
