@@ -86,12 +86,15 @@ def discover(
     - Forecasts get worse at no horizon.
     - No slow drift of the sensor's zero explains as much.
 
-    *Choice.* Of forms that explain the first part equally well, that one is chosen which explains all data
-    and predicts the rest best. The others are named as alternatives. After an addition all coefficients are
-    refitted, and the search goes on.
+    *Choice.* Of several forms that one is chosen which has the largest log evidence on all data, each at its
+    own noise and model error. Splines over the likely coordinates, their formulas and a power with a free
+    exponent compete with the library. What lies within 10 nats is named as an alternative. After an addition
+    all coefficients are refitted, and the search goes on.
 
-    *Verdict.* An effect is not identified if random forces explain as much, such as those of a moving support
-    (a disk's film excludes them). It is not confirmed if free runs over the last 40 % do not get
+    *Verdict.* An effect is identified if it has no rival, is a law of one term, each of its constants is
+    determined, the held-out gain has a size, and nothing else is missing; `Discovery.doubts` says what speaks
+    against it. It is not identified either if random forces explain as much, such as those of a moving
+    support (a disk's film excludes them). It is not confirmed if free runs over the last 40 % do not get
     significantly better, unless they are at the noise floor already. If nothing passes, but chi2 per degree
     of freedom exceeds 2.5 or free runs lose the motion, the model lacks an effect that these data do not
     name. The nearest candidates are listed with their held-out errors.

@@ -269,7 +269,8 @@ def is_single_term(node: Node) -> bool:
     angle, and no constant stands beside the term.
     """
     if node[0] in ("+", "-"):
-        return {_wave(part) for part in node[1:]} in ({("sin", n), ("cos", n)} for n in _angles(node))
+        waves = {_wave(part) for part in node[1:]}
+        return any(waves == {("sin", angle), ("cos", angle)} for angle in _angles(node))
     return not any(len(part) == 3 and all(_varies(p) for p in part[1:]) for part in parts(node))
 
 

@@ -151,7 +151,9 @@ def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> F
         if fitted is not None:
             trials.append(fitted)
     best = max(trials, key=lambda one: one.nats, default=None)
-    return best and _formula(curve, best, [name for name in _NAMES if name not in taken])
+    if best is None:
+        return None
+    return _formula(curve, best, [name for name in _NAMES if name not in taken])
 
 
 def without(formula: Formula, name: str) -> Formula | None:
