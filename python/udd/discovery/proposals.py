@@ -165,7 +165,12 @@ class Proposals:
         usable = list(dict.fromkeys(first.get(s.candidate.effect.name) for s in self.scores.usable()))
         for other in filter(None, usable[:_PAIRED]):
             pair = [leader.candidates[0], other] if leader else []
-            if pair and pair[0] is not other and pair not in pairs and pair[::-1] not in pairs:
+            if (
+                pair
+                and pair[0].effect.name != other.effect.name
+                and pair not in pairs
+                and pair[::-1] not in pairs
+            ):
                 pairs.append(pair)
         # What one joint of a machine has the others have too, whatever the scores around a wrong motion say.
         alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
