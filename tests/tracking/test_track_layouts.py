@@ -14,6 +14,8 @@ import pytest
 pytest.importorskip("av", reason="the tracker's extra is not installed")
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
+import cv2
+
 import udd
 from film_for_tests import FPS, swinging, write
 from tracked_errors import errors, rms
@@ -235,3 +237,21 @@ def test_a_path_that_is_no_circle_is_refused(clock: Callable[[float], float], tm
     shots = [swinging(clock, k / FPS, 0.0, rng, long=each) for k, each in enumerate(long)]
     with pytest.raises(TrackError, match="the bob's path is no circle"):
         udd.track(write(tmp_path / "bob.mp4", shots), bob="red")
+
+
+def test_a_pendulum_filmed_by_hand(clock: Callable[[float], float], tmp_path: Path) -> None:
+    """Its background has nothing but a patch to hold on to in `swinging`, so there is more of it here."""
+    rng, wall = np.random.default_rng(5), np.random.default_rng(6)
+    spots = wall.uniform([10, 10], [310, 50], (30, 2)).round().astype(int)
+    moved = [(4 * np.sin(0.31 * k), 3 * np.sin(0.23 * k + 1)) for k in range(60)]
+    shots = []
+    for k, (du, dv) in enumerate(moved):
+        picture = swinging(clock, k / FPS, 0.0, rng)
+        for u, v in spots:
+            picture[v - 3 : v + 3, u - 3 : u + 3] = 40
+        view = np.array([[1, 0, du], [0, 1, dv]])
+        shots.append(cv2.warpAffine(picture, view, picture.shape[1::-1], borderMode=cv2.BORDER_REPLICATE))
+    with pytest.warns(UserWarning, match="the camera moved"):
+        m = udd.track(write(tmp_path / "hand.mp4", shots), bob="red")
+    off = m["theta"] - np.array([clock(t) for t in m.t])
+    assert m.seen.mean() > 0.9 and np.nanstd(off) < 1.5e-3  # a pixel is 4.3 mrad

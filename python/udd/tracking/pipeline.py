@@ -23,7 +23,7 @@ from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.calibration.rim import Rim, outline
 from udd.tracking.calibration.scale import scale as size_of
 from udd.tracking.correction import Correction, applied, correction_of
-from udd.tracking.detection.camera_motion import CameraMotion, camera_motion
+from udd.tracking.detection.camera_motion import CameraMotion, steadied
 from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost, lost
 from udd.tracking.detection.recognition import placed, recognise
 from udd.tracking.detection.survey import Survey, survey
@@ -222,7 +222,7 @@ def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractCont
 
 def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
     """Coloured marks: survey, calibrate, follow, refine, to metres, flags."""
-    look_over, camera = _steadied(film)
+    look_over, camera = steadied(film, survey(film))
     found = _measured(film, look_over, camera, options, progress, watch)
     if _retimed(film, found):
         found = _measured(film, survey(film), camera, options, progress, watch)
@@ -283,18 +283,6 @@ def _measured(
         tracks = _refine(film, known, tracks, progress)
     tracks = drop_weak(tracks)
     return _to_metres(film, tracks, known, options, rim, options.refine, look_over, camera)
-
-
-def _steadied(film: Film) -> tuple[Survey, CameraMotion | None]:
-    """Look over the film; a camera's motion, zoom and steps of exposure are undone from here on."""
-    look_over = survey(film)
-    camera = camera_motion(film, look_over)
-    if camera is None:
-        return look_over, None
-    correct = camera.correction(Correction(full_range=film.full_range))
-    film.correct = correct
-    warnings.warn(f"{film.path}: {camera.text}", stacklevel=outside())
-    return replace(look_over, bursts=[[correct(p) for p in burst] for burst in look_over.bursts]), camera
 
 
 def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from udd.errors import outside
 from udd.tracking.correction import Correction
 from udd.video.reader import Film, Picture, Plane
 
@@ -178,6 +180,17 @@ class _Seen(NamedTuple):
     row: Row
     used: NDArray[np.intp]
     rest: NDArray[np.complex128]
+
+
+def steadied(film: Film, look_over: Survey) -> tuple[Survey, CameraMotion | None]:
+    """Undo a camera's motion, zoom and steps of exposure, in the survey and in the film from here on."""
+    camera = camera_motion(film, look_over)
+    if camera is None:
+        return look_over, None
+    correct = camera.correction(Correction(full_range=film.full_range))
+    film.correct = correct
+    warnings.warn(f"{film.path}: {camera.text}", stacklevel=outside())
+    return replace(look_over, bursts=[[correct(p) for p in burst] for burst in look_over.bursts]), camera
 
 
 class Background:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
+from udd.tracking.correction import applied
+from udd.tracking.detection.camera_motion import CameraMotion, steadied
 from udd.tracking.detection.colour_blobs import blobs
 from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, is_copy, lost
 from udd.tracking.detection.survey import survey
@@ -62,7 +64,8 @@ def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], objec
     TrackError
         No bob of that colour moves in the film, or its path is too short an arc to tell the pivot.
     """
-    some = [burst[0] for burst in survey(film).bursts if not burst[0].damaged]
+    look_over, camera = steadied(film, survey(film))
+    some = [burst[0] for burst in look_over.bursts if not burst[0].damaged]
     behind, noise = _background(some)
     rows: list[tuple[float, str, Blob | None]] = []
     size = _size(film, some, behind, options)
@@ -84,7 +87,7 @@ def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], objec
             path = [*path[-2:], blob.centre]
         rows.append((picture.t, flag, blob))
         last = picture.y
-    return _angles(film, rows, options, noise)
+    return _angles(film, rows, options, noise, camera)
 
 
 def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
@@ -234,7 +237,11 @@ def _exposure(t: Array, at: NDArray[np.complex128], moments: Array) -> tuple[flo
 
 
 def _angles(
-    film: Film, rows: list[tuple[float, str, Blob | None]], options: TrackOptions, noise: float
+    film: Film,
+    rows: list[tuple[float, str, Blob | None]],
+    options: TrackOptions,
+    noise: float,
+    camera: CameraMotion | None,
 ) -> Measurement:
     t = np.array([row[0] for row in rows])
     flag = [row[1] for row in rows]
@@ -284,12 +291,14 @@ def _angles(
         "blur_px": np.where(seen, np.round(rate * open_for, 3), np.nan),
         "method": np.where(seen, "fast", "none"),
     }
+    quality |= applied(film).columns
     length = options.length
     scale = options.scale or (radius / length if length else None)
     how = "given" if options.scale else "length"
     meta: dict[str, Any] = {
         "source": film.path.name,
         "fps": film.fps,
+        **({} if camera is None else camera.meta),
         **({"clock": film.clock_text} if film.clock_text else {}),
         "frames": len(t),
         "frames_missing": max(0, film.promised - len(t)),
