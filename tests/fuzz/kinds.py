@@ -85,7 +85,21 @@ def watched() -> Iterator[None]:
 # --- formulas
 
 NAMES = ["x", "v", "t", "a", "pi"]
-FUNCTIONS = ["sin", "cos", "exp", "ln", "sqrt", "abs", "sign", "tanh", "nosuch"]
+FUNCTIONS = [
+    "sin",
+    "cos",
+    "exp",
+    "ln",
+    "sqrt",
+    "abs",
+    "sign",
+    "tanh",
+    "sinh",
+    "cosh",
+    "tan",
+    "atan",
+    "nosuch",
+]
 NUMBERS = ["0", "1", "2", "0.5", "1e300", "1e-300", "1e999", "-3", "2.0"]
 
 
