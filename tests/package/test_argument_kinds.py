@@ -75,6 +75,7 @@ def branch() -> udd.Branch:
         (lambda: udd.smooth(RECORD, gap=5e-324), "gap is"),
         (lambda: udd.film.Defects(lens=None), "lens"),  # type: ignore[arg-type]
         (lambda: udd.film.Defects(off_axis=("a", 0)), "off_axis"),  # type: ignore[arg-type]
+        (lambda: udd.film.Defects(clock=1), "clock"),  # type: ignore[arg-type]
         (lambda: udd.SweepSpec.from_json(None), "text"),  # type: ignore[arg-type]
         (lambda: udd.tracking.TrackOptions(sigma=None), "sigma"),  # type: ignore[arg-type]
         (lambda: udd.plot.geometry(True), "ax"),  # type: ignore[arg-type]

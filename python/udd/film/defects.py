@@ -128,7 +128,8 @@ class Defects:
                 raise UddError(f"{name} must be finite numbers of shape {shape}, got {getattr(self, name)!r}")
         for name, width, least in (("bumps", 3, -1e3), ("zooms", 2, 0.2), ("gains", 2, 0.01),
                                    ("hands", 2, 0.0), ("clock", 2, 0.01)):  # fmt: skip
-            rows = np.asarray(getattr(self, name), dtype=np.float64).reshape(-1, width)
+            given = array(name, getattr(self, name))
+            rows = given.reshape(-1, width) if given.size % width == 0 else np.full((1, width), np.nan)
             times = rows[:, 0] if name != "hands" else rows.ravel()
             if not (np.isfinite(rows).all() and (np.diff(times) > 0).all() and (rows[:, 1:] >= least).all()):
                 raise UddError(
