@@ -67,7 +67,7 @@ def test_a_documented_type_exists() -> None:
         f"{path.relative_to(PACKAGE)}: {line}"
         for path, tree in trees.items()
         for line in documented_types(tree)
-        for name in re.findall(r"(?<![\w.])[A-Z]\w*", line.split(" : ", 1)[1])
+        for name in re.findall(r"(?<![\w.\"])[A-Z]\w*", line.split(" : ", 1)[1])
         if name not in existing
     ]
     assert missing == []
