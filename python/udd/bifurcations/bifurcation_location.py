@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -247,21 +248,15 @@ def location_error(
     if isinstance(curve, EquilibriumCurve):
         return _scatter(curve, a, sigma, place, step, name)
 
-    def at(distance: float) -> tuple[float, Floats]:
-        u = _beside(curve, a, distance)
-        there = CurvePoint(u, tangent_at(curve, u, a.tangent))
-        return float(getattr(test_functions_at(curve, there), name)), np.array(
-            [curve.value(u), curve.period(u)]
-        )
+    def at(distance: float, own: PeriodicOrbitCurve = curve) -> tuple[float, Floats]:
+        u = _beside(own, a, distance)
+        there = CurvePoint(u, tangent_at(own, u, a.tangent))
+        return float(getattr(test_functions_at(own, there), name)), np.array([own.value(u), own.period(u)])
 
     known = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
     (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
-    curve.loose, curve.seen = COARSE, None
-    try:
-        moved, there = at(sigma)
-    finally:
-        curve.loose, curve.seen = 1.0, None
+    moved, there = at(sigma, replace(curve, loose=COARSE))
     here, _ = at(sigma)
     shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
     value, period = rounding_of(known) + np.abs(there - known) + np.abs(shift)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import optimize
@@ -89,6 +89,13 @@ class Segment:
     def length(self) -> float:
         """The distance of the two points, in scaled unknowns."""
         return float(np.linalg.norm(self.end.v - self.begin.v))
+
+    def coarse(self) -> Segment:
+        """The step with less accurate runs."""
+        curve, surface = self.surface.curve, self.surface
+        assert isinstance(curve, PeriodicOrbitCurve)
+        less = SolutionSurface(replace(curve, loose=COARSE), surface.second, surface.scale)
+        return replace(self, surface=less)
 
     def at(self, part: float) -> SurfacePoint:
         """The point of the curve at a part of the way.
@@ -264,21 +271,16 @@ def _scatter(kind: str, segment: Segment, part: float, function: Callable[[Surfa
     """
     near = np.linspace(-1.0, 1.0, _SAMPLES)
 
-    def seen(where: float) -> list[float]:
-        point = segment.at(where)
-        return [function(point), *segment.surface.values(point), *_coefficients(kind, point).values()]
+    def seen(where: float, own: Segment = segment) -> list[float]:
+        point = own.at(where)
+        return [function(point), *own.surface.values(point), *_coefficients(kind, point).values()]
 
     table, powers = np.array([seen(part + _ASIDE * x) for x in near]), np.vander(near, 4)
     fitted = np.linalg.lstsq(powers, table, rcond=None)[0]
     noise, slope = np.abs(powers @ fitted - table).max(axis=0), np.abs(fitted[2])
     gap = noise[0]
     if isinstance(segment.surface.curve, PeriodicOrbitCurve):
-        here = seen(part)
-        segment.surface.curve.loose = COARSE
-        try:
-            moved = np.abs(np.array(seen(part)) - here)
-        finally:
-            segment.surface.curve.loose = 1.0
+        moved = np.abs(np.array(seen(part, segment.coarse())) - seen(part))
         gap, noise = gap + moved[0], noise + moved
     off = gap / slope[0] if slope[0] > gap else np.nan
     # The slope counts in samples' distances, and so does this distance from the zero.
