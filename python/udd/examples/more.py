@@ -17,7 +17,7 @@ from . import make
 _TRACK = """\
 # What is known of film.mp4; see the tracker's page in the documentation.
 disk_radius = 0.08
-calibrate = {lens = "off"}
+calibrate = {lens = false}
 """
 _SWEEP = """\
 quantity = "lyapunov"

@@ -13,8 +13,9 @@ export function read(hash, catalogue) {
   if (!about) throw new Error(t("link_model", { text: kind }));
   const model = { kind };
   const changed = [];
-  for (const p of about.parameters) {
-    model[p.name] = given.has(p.name) ? within(p, number(p.name, given.get(p.name)), changed) : p.default;
+  for (const [k, p] of about.parameters.entries()) {
+    model[p.name] = given.has(p.name) ? number(p.name, given.get(p.name)) : p.default;
+    if (k === 0) model[p.name] = within(p, model[p.name], changed); // the drive
   }
   if (kind === "disk") {
     model.edge = given.get("edge") === "ignore" ? "ignore" : "stop";
@@ -27,7 +28,7 @@ export function read(hash, catalogue) {
   return { model, state, twin: given.get("twin") === "1", tab: given.get("tab"), speed, changed };
 }
 
-/** A number of a link; one far beyond its range, as a speed in other units is, is changed, and that is noted. */
+/** A drive of a link; one far beyond its range, as a speed in other units is, is changed, and that is noted. */
 function within(about, value, changed) {
   const most = FAR * about.most;
   if (value <= most && value >= Math.min(0, about.least)) return value;

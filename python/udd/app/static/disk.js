@@ -88,12 +88,13 @@ export class DiskView extends Canvas {
 
   /** Show as much as the disks have needed lately: more at once, less slowly. */
   zoom(disks) {
+    if (this.held) return; // a dragged disk stays under the finger
     let far = 0;
     for (const [y, z, , trail] of disks) {
       far = Math.max(far, Math.hypot(y, z));
       trail?.each((o) => (far = Math.max(far, Math.hypot(trail.rows[o + 1], trail.rows[o + 2]))));
     }
-    const want = this.held ? FAR : Math.min(FAR, Math.max(NEAR, 1.06 + far / this.radius));
+    const want = Math.min(FAR, Math.max(NEAR, 1.06 + far / this.radius));
     this.reach = want > this.reach ? want : this.reach + 0.02 * (want - this.reach);
   }
 
