@@ -20,6 +20,7 @@ class _Parameter(TypedDict):
     range: tuple[float, float]
     role: str
     scan: list[float]
+    along: str
 
 class _Effect(TypedDict):
     name: str

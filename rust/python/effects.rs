@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::model::effects::{Body, EffectParameter, FrictionModel, Kind, Momentum, Role, Slot};
 
 /// Every effect: a list of dicts with the keys name, title, equation, meaning, bodies, slots, momenta, treatments
-/// and parameters; each parameter is a dict with the keys name, unit, default, range, role and scan.
+/// and parameters; each parameter is a dict with the keys name, unit, default, range, role, scan and along.
 #[pyfunction]
 fn effect_library(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
@@ -33,10 +33,11 @@ fn effect_library(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
 }
 
 fn parameter<'py>(py: Python<'py>, p: &EffectParameter) -> PyResult<Bound<'py, PyDict>> {
-    let (role, scan): (&str, &[f64]) = match p.role {
-        Role::Amplitude => ("amplitude", &[]),
-        Role::Shape(values) => ("shape", values),
-        Role::Frequency => ("frequency", &[]),
+    let (role, scan, along): (&str, &[f64], &str) = match p.role {
+        Role::Amplitude => ("amplitude", &[], ""),
+        Role::Shape(values) => ("shape", values, ""),
+        Role::Frequency => ("frequency", &[], ""),
+        Role::Scanned(what) => ("scanned", &[], what),
     };
     let entry = PyDict::new(py);
     entry.set_item("name", p.name)?;
@@ -45,6 +46,7 @@ fn parameter<'py>(py: Python<'py>, p: &EffectParameter) -> PyResult<Bound<'py, P
     entry.set_item("range", p.range)?;
     entry.set_item("role", role)?;
     entry.set_item("scan", scan.to_vec())?;
+    entry.set_item("along", along)?;
     Ok(entry)
 }
 

@@ -91,6 +91,33 @@ def test_what_needs_its_frames_keeps_them():
     assert thinned(slow).measurement is slow
 
 
+def test_a_motion_that_dies_down_below_its_noise_is_averaged():
+    t = np.arange(0, 156, 0.01)
+    theta = 2.0 * np.exp(-t / 4) * np.cos(7 * t)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(len(t))
+    found = thinned(udd.Measurement(t, {"theta": theta + noise}))
+    assert found.every >= 3
+    few = found.measurement.rows(np.flatnonzero(found.measurement.seen))
+    off = few["theta"] - np.interp(few.t, t, theta)
+    assert np.sqrt((off**2).mean()) == pytest.approx(0.01 * np.sqrt(1.18 / found.every), rel=0.1)
+    # As the pull of a brake that bends the motion within a few frames is at its start.
+    fast = udd.Measurement(t, {"theta": 2.0 * np.exp(-t / 4) * np.cos(150 * t) + noise})
+    assert thinned(fast).every == 1
+    # What never goes beyond its noise has no time scale.
+    assert thinned(udd.Measurement(t, {"theta": noise})).every >= 3
+
+
+def test_frames_with_a_lost_column_are_left_out_of_the_averages():
+    t = np.arange(0, 156, 0.01)
+    rng = np.random.default_rng(0)
+    seen = np.stack([np.cos(3 * t), np.sin(3 * t)], axis=-1) + 3e-3 * rng.standard_normal((len(t), 2))
+    gone = rng.choice(len(t), 200, replace=False)
+    seen[gone, 1] = np.nan
+    found = thinned(udd.Measurement(t, seen, names=("a", "b")))
+    assert (found.every, found.frames) == (4, len(t))
+    assert np.isfinite(found.measurement.values[1:]).all()
+
+
 def test_a_discovery_says_what_was_averaged():
     t = np.arange(0, 20, 0.001)
     truth = udd.Pendulum(0.6, k0=0.004, effects=[udd.effects.quadratic_drag(c=0.02)])

@@ -7,8 +7,14 @@ import itertools
 import numpy as np
 import pytest
 
+from udd import effects
 from udd.discovery.scoring import score_scan
+from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan, Scored
+
+
+def candidate(k: int) -> Candidate:
+    return Candidate(effects.quadratic_drag(), str(k))
 
 
 def test_a_pair_lowers_chi2_as_least_squares_do() -> None:
@@ -17,7 +23,7 @@ def test_a_pair_lowers_chi2_as_least_squares_do() -> None:
     design = rng.standard_normal((60, 6))
     design[:, 5] = design[:, 4] + 1e-7 * rng.standard_normal(60)  # two candidates that act alike
     data = design @ [0.0, 2.0, -1.0, 0.5, 0.3, 0.0] + rng.standard_normal(60)
-    scored = [Scored(str(k), 0.0, 1.0, (), (), k == 2, True) for k in range(5)]  # type: ignore[arg-type]
+    scored = [Scored(candidate(k), 0.0, 1.0, (), (), k == 2, True) for k in range(5)]
     found, number = Scan(scored, design.T @ data, design.T @ design, columns, 2.0).pairs()
     assert number == len(found)
 
@@ -32,7 +38,7 @@ def test_a_pair_lowers_chi2_as_least_squares_do() -> None:
     falls = [fall for _group, fall in found]
     assert falls == sorted(falls, reverse=True)
     # Normal equations of well-conditioned columns lose a few digits.
-    assert {tuple(s.candidate for s in group): fall for group, fall in found} == pytest.approx(
+    assert {tuple(s.candidate.title for s in group): fall for group, fall in found} == pytest.approx(
         expected, rel=1e-9
     )
 
@@ -40,10 +46,10 @@ def test_a_pair_lowers_chi2_as_least_squares_do() -> None:
 def test_of_millions_of_pairs_those_of_the_strongest_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(score_scan, "_MOST_PAIRS", 10)
     strength = [3.0, 9.0, 1.0, 7.0, 5.0, 8.0]
-    scored = [Scored(str(k), chi2, 1.0, (), (), False, True) for k, chi2 in enumerate(strength)]  # type: ignore[arg-type]
+    scored = [Scored(candidate(k), chi2, 1.0, (), (), False, True) for k, chi2 in enumerate(strength)]
     columns = [[k] for k in range(6)]
     found, number = Scan(scored, np.sqrt(strength), np.eye(6), columns, 1.0).pairs()
     # Five candidates make ten pairs, six make fifteen, which all count.
     assert len(found) == 10 and number == 15
-    assert [s.candidate for s in found[0][0]] == ["1", "5"]
-    assert "2" not in {s.candidate for group, _ in found for s in group}
+    assert [s.candidate.title for s in found[0][0]] == ["1", "5"]
+    assert "2" not in {s.candidate.title for group, _ in found for s in group}

@@ -170,10 +170,13 @@ def test_every_effect_has_a_constructor(spec: effects.Spec) -> None:
     assert expression != spec.equation and "0.25" in expression
     velocity = bool({"lateral", "vertical"} & set(spec.slots))
     assert bool(spec.momenta) == velocity
-    model = udd.Disk(0.039, effects=[effect])
-    # Zero amplitude: the plain equations, up to the order of a few sums.
-    x = [2.0, 0.01, -0.02, 0.3]
-    np.testing.assert_allclose(model.rates(1.0, x), udd.Disk(0.039).rates(1.0, x), rtol=1e-12)
+    bodies = {"disk": (udd.Disk(0.039), [2.0, 0.01, -0.02, 0.3]), "pendulum": (udd.Pendulum(0.5), [2.0, 0.3])}
+    for body in spec.bodies:
+        plain, x = bodies[body]
+        # Zero amplitude: the plain equations, up to the order of a few sums.
+        np.testing.assert_allclose(
+            plain.with_effects([effect]).rates(1.0, x), plain.rates(1.0, x), rtol=1e-12
+        )
 
 
 def test_unknown_effects_are_attribute_errors() -> None:

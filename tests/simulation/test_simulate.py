@@ -66,6 +66,8 @@ def all_effects() -> list[effects.Effect]:
     sizes = {"relaxation": 5.0, "slip": 0.3, "lateral_slip": 0.3, "cubic_drag": 1e-5, "quadratic_drag": 1e-4}
     result = []
     for spec in effects.library():
+        if "disk" not in spec.bodies:
+            continue
         for momentum in spec.momenta or (None,):
             size = {p.name: sizes.get(spec.name, 3e-3) for p in spec.parameters if p.role == "amplitude"}
             result.append(spec.make(momentum=momentum, **size))
@@ -77,6 +79,8 @@ MODELS = [
     (udd.Pendulum(0.5, k0=0.01), [0.0, 2.0], 10.0),
     (udd.Disk(0.088), [3.0, 0.005, 0.0, 0.0], 3.0),
     (udd.Pendulum(0.5, k0=0.01, effects=effects.coulomb(c=0.02)), [0.0, 1.0], 3.0),
+    (udd.Pendulum(0.5, k0=0.01, effects=effects.load_coulomb(f=0.02)), [0.0, 2.0], 3.0),
+    (udd.Pendulum(0.5, k0=0.01, effects=effects.local_brake(a=0.05, c=0.1, s=0.1)), [0.0, 1.0], 3.0),
     *((udd.Disk(0.039, effects=[effect]), START, 0.6) for effect in all_effects()),
 ]
 

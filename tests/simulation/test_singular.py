@@ -17,7 +17,7 @@ from udd.discovery.nonparametric.penalized_curves import smooth
 from udd.discovery.results import Alternative
 from udd.discovery.scoring.candidates import renamed
 from udd.discovery.scoring.forcing import Score
-from udd.discovery.scoring.score_scan import _score
+from udd.discovery.scoring.score_scan import score_of
 from udd.discovery.scoring.term_library import waves
 from udd.discovery.trial_fits import TrialFit
 from udd.discovery.validation.confirmation import _expected
@@ -81,7 +81,7 @@ def test_a_covariance_without_an_inverse_tells_what_it_can():
 def test_scores_that_run_away_say_nothing():
     candidate = SimpleNamespace(effect=udd.effects.slip())
     information = np.full((1, 1), np.nan)
-    scored = _score(candidate, np.ones(1), information, np.ones((1, 1)), 1.0)
+    scored = score_of(candidate, np.ones(1), information, np.ones((1, 1)), 1.0)
     assert scored.absorbed and scored.chi2 == 0.0
 
 

@@ -25,6 +25,7 @@ from .trial_fits import (
     of_curve,
     of_library,
     one_of_each,
+    price_of,
     with_more,
 )
 
@@ -122,7 +123,25 @@ class Proposals:
         self._trying([candidate.title for candidate, _amplitudes in best])
         # A wrong one may take a hundred times as long as the right one, which most often is the first.
         first = self._in_full(best[:1])
-        return one_of_each(first + self._in_full(best[1:], self._beside(first)))
+        return self._worthwhile(one_of_each(first + self._in_full(best[1:], self._beside(first))))
+
+    def _worthwhile(self, trials: list[TrialFit]) -> list[TrialFit]:
+        """Leave out laws with a scanned number that explain hardly more than the best law that has none.
+
+        A free power looks like every drag. If its gain does not pay half of its number in the first part, it
+        pays none in all data.
+        """
+        # Without this half of a search's time goes to powers beside a quadratic drag.
+        plain = min((t for t in trials if not t.candidates[0].scanned), key=lambda t: t.rank, default=None)
+        if plain is None:
+            return trials
+        price = price_of(self.fit) / 2 * max(plain.fit.scatter, 1.0)
+
+        def leads(trial: TrialFit) -> bool:
+            level, chi2 = trial.rank
+            return (level, chi2 + price * trial.candidates[0].scanned) < plain.rank
+
+        return [t for t in trials if not t.candidates[0].scanned or leads(t)]
 
     def _look_alikes(self, tried: list[TrialFit]) -> list[TrialFit]:
         """What does nearly the same along the motion as the best of those tried, whatever its score."""
@@ -156,7 +175,7 @@ class Proposals:
         scored = sorted((s for s in self.scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
         for one in scored:
-            if one.candidate.usual and one.candidate.effect.name not in loose:
+            if one.candidate.usual and not one.candidate.scanned and one.candidate.effect.name not in loose:
                 first.setdefault(one.candidate.effect.name, one.candidate)
         best = list(first.values())[:_PAIRED]
         pairs = [list(pair) for pair in itertools.combinations(best, 2)]

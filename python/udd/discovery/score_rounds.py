@@ -11,6 +11,7 @@ from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
+from udd.discovery.scoring.shape_scan import strongest_shapes
 from udd.fitting import Fit, beyond_schedule, with_larger_model_error
 
 from .thresholds import ALPHA
@@ -49,7 +50,9 @@ class ScoreRound:
     def usable(self) -> list[Scored]:
         """The candidates with physical numbers whose work no free parameter does, the strongest first."""
         found = [s for s in self.library.scored if s.physical and not s.absorbed]
-        return sorted(found, key=lambda s: -round(s.chi2, 3))
+        # Without the price of what a scan chose a free power comes before the law that is right.
+        price = price_of(self.fit)
+        return sorted(found, key=lambda s: -round(s.chi2 - price * s.candidate.scanned, 3))
 
     def passing(self) -> list[Scored]:
         """Those of them that neither chance nor a film's faults explain."""
@@ -96,10 +99,11 @@ def score_round(
 
     def score(current: Fit) -> ScoreRound:
         ripple, frequencies = strongest_ripple(current)
-        best = [ripple.candidate] if ripple else []
+        shaped, shapes = strongest_shapes(current)
+        best = [s.candidate for s in (*([ripple] if ripple else []), *shaped)]
         scanned = scan(current, [*library(current.model, given, current.states), *best])
         curves = scan_curves(current)
-        comparisons = len(scanned.scored) + frequencies + curves.comparisons
+        comparisons = len(scanned.scored) + frequencies + shapes + curves.comparisons
         return ScoreRound(current, scanned, curves.curves, comparisons)
 
     looser = with_larger_model_error(fitted, _SCATTER)

@@ -36,10 +36,12 @@ class Parameter:
         The physically sensible range.
     role : str
         ``"amplitude"`` (the effect is proportional to it and absent where all amplitudes are zero),
-        ``"shape"``, ``"frequency"``, or ``"width"``: over which a smoothed jump goes, of which a search keeps
-        the best and tells none apart.
+        ``"shape"``, ``"frequency"``, ``"scanned"`` (a shape of which a search fits the best value alone), or
+        ``"width"``: over which a smoothed jump goes, of which a search keeps the best and tells none apart.
     grid : tuple of float
         Values that a scan of candidates tries, for a shape.
+    along : str
+        What a scanned number is: ``"angle"``, ``"speed"``, ``"power"`` or ``"duration"``.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Parameter:
     range: tuple[float, float]
     role: str
     grid: tuple[float, ...]
+    along: str = ""
 
     @property
     def sought(self) -> bool:
@@ -111,7 +114,7 @@ class Spec:
     @property
     def shaped(self) -> bool:
         """Whether a fit that adds the effect finds a shape of it too."""
-        return any(p.sought and p.role == "shape" for p in self.parameters)
+        return any(p.sought and p.role in ("shape", "scanned") for p in self.parameters)
 
     def make(self, *, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
         """The effect with these parameter values; the others take their defaults.
@@ -156,7 +159,7 @@ def _specs() -> Mapping[str, Spec]:
     specs = {}
     for entry in _core.effect_library():
         parameters = tuple(
-            Parameter(p["name"], p["unit"], p["default"], p["range"], p["role"], tuple(p["scan"]))
+            Parameter(p["name"], p["unit"], p["default"], p["range"], p["role"], tuple(p["scan"]), p["along"])
             for p in entry["parameters"]
         )
         name = entry["name"]

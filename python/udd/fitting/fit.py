@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
-from udd.effects import Effect
+from udd.effects import Effect, Parameter
 from udd.errors import FitError, outside
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
@@ -378,7 +378,8 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
     """Fit again with more effects, all coefficients free, from where a fit ended.
 
     The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
-    line; a shape that may have any value is, once the rest has been found, within a factor of some two.
+    line; a shape that may have any value is, once the rest has been found, within a factor of some two, or
+    a place by about the width that belongs to it.
 
     Parameters
     ----------
@@ -399,14 +400,18 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
     own = [(e, p) for e in effects for p in e.spec.parameters if p.sought]
     waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "frequency"]
-    shapes = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "shape"]
+    shapes = [
+        (f"{e.name}.{p.name}", e.parameters[p.name], _spread(e, p))
+        for e, p in own
+        if p.role in ("shape", "scanned")
+    ]
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
     problem = replace(problem, free=problem.free + more)
     first = replace(goal, chi2=np.inf) if shapes else goal  # which is lower once the shapes are free
     found = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:], goal=first)
     if not shapes:
         return found
-    more = tuple(Free(name, "model", order.index(name), value, value) for name, value in shapes)
+    more = tuple(Free(name, "model", order.index(name), value, sd) for name, value, sd in shapes)
     problem = replace(problem, free=problem.free + more)
     if found.level > 1:
         try:
@@ -418,6 +423,14 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
             pass
     # Far from its shape a model that is held that tightly does not find the way.
     return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[1:], goal=goal)
+
+
+def _spread(effect: Effect, parameter: Parameter) -> float:
+    """The standard deviation of the prior of a shape, or of a place: as far as the next that a scan tries."""
+    widths = [effect.parameters[p.name] for p in effect.spec.parameters if p.role == "shape"]
+    if parameter.role == "scanned" and widths:
+        return widths[0]
+    return abs(effect.parameters[parameter.name])
 
 
 def as_stated(fitted: Fit) -> Fit:

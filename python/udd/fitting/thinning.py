@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -26,6 +27,8 @@ MANY_DRIVEN = 2000
 _BLOCKS = 2
 _SHORTER = 0.8  # times the block, tried next where the motion bends too much within it
 _FAST = 0.9  # quantile of the rates: of frames one in fifty may be odd
+_STRETCHES = 20  # of a record that is mostly at rest, each of which may show the motion
+_WHOLE = 0.9  # of the frames seen, of which every column must be
 _BIAS = 0.3  # of a mean's noise that the bends of the motion within a block may move it by
 _FULL = 0.8  # of a block's frames, from which on its mean is corrected; below half of them there is none
 _NEXT = 1.5  # steps within which a frame follows another
@@ -69,15 +72,15 @@ def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
     measurement = unwrapped(measurement, angles)
     n = int(measurement.seen.sum())
     many = MANY_DRIVEN if measurement.inputs else MANY
-    gaps = not np.isfinite(measurement.values[measurement.seen]).all()
-    if n <= many or gaps:  # sensors with rates of their own have no blocks in common
+    # A frame with a lost column counts as lost; sensors with rates of their own have no blocks in common.
+    whole = np.asarray(np.isfinite(measurement.values).all(axis=1))
+    if n <= many or whole.sum() < _WHOLE * n:
         return Thinned(measurement, 1, n, {})
-    t = measurement.t[measurement.seen]
-    values = measurement.values[measurement.seen]
+    t, values = measurement.t[whole], measurement.values[whole]
     step = float(np.median(np.diff(t)))
-    every = min(int(_change(t, values, step) / _BLOCKS / step), -(-2 * n // many))
+    every = int(min(_change(t, values, step) / _BLOCKS / step, -(-2 * n // many)))
     while every > 1:
-        found = _averaged(measurement, t, values, step, every)
+        found = _averaged(measurement, whole, t, values, step, every)
         if found is not None:
             steps = {name: lattice(x) for name, x in zip(measurement.names, values.T, strict=True)}
             return Thinned(found, every, n, steps)
@@ -88,21 +91,31 @@ def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
 def _change(t: Array, values: Array, step: float) -> float:
     """How long the motion takes to change, s: the least over the columns of spread over rate.
 
-    Rates are differences over the shortest time in which the motion goes far beyond its noise.
+    Rates are differences over the shortest time in which the motion goes far beyond its noise. A motion that
+    dies down may do so within a stretch of the record alone; one that never does restricts no block.
     """
-    shortest = np.inf
-    for x in values.T:
-        spread, noise = float(x.std()), _noise(x)
-        lag = 1
-        while lag < len(x) // 4:
-            moved = np.abs(x[lag:] - x[:-lag])[t[lag:] - t[:-lag] < 1.5 * lag * step]
-            if len(moved) and np.quantile(moved, _FAST) > max(0.1 * spread, 10 * noise):
-                break
-            lag *= 2
-        else:
-            continue  # it never moves
-        shortest = min(shortest, spread * lag * step / float(np.quantile(moved, _FAST)))
-    return float(shortest) if np.isfinite(shortest) else 0.0
+    noises = [_noise(x) for x in values.T]
+
+    def least(rows: slice) -> float:
+        columns = zip(values[rows].T, noises, strict=True)
+        return min(_change_of(t[rows], x, step, noise) for x, noise in columns)
+
+    whole = least(slice(None))
+    if np.isfinite(whole):
+        return whole
+    ends = np.linspace(0, len(t), _STRETCHES + 1).astype(int)
+    return min(least(slice(*pair)) for pair in itertools.pairwise(ends))
+
+
+def _change_of(t: Array, x: Array, step: float, noise: float) -> float:
+    """How long one column takes to change, s; infinite if it never goes far beyond its noise."""
+    spread, lag = float(x.std()), 1
+    while lag < len(x) // 4:
+        moved = np.abs(x[lag:] - x[:-lag])[t[lag:] - t[:-lag] < 1.5 * lag * step]
+        if len(moved) and np.quantile(moved, _FAST) > max(0.1 * spread, 10 * noise):
+            return spread * lag * step / float(np.quantile(moved, _FAST))
+        lag *= 2
+    return float("inf")
 
 
 def _noise(x: Array) -> float:
@@ -111,9 +124,14 @@ def _noise(x: Array) -> float:
 
 
 def _averaged(
-    measurement: Measurement, t: Array, values: Array, step: float, every: int
+    measurement: Measurement,
+    whole: NDArray[np.bool_],
+    t: Array,
+    values: Array,
+    step: float,
+    every: int,
 ) -> Measurement | None:
-    """Means over blocks of so many frames; None where blocks are too long for how the motion bends."""
+    """Average blocks of so many of the whole frames; None if blocks are too long for how the motion bends."""
     length = every * step
     part = np.floor((t - t[0]) / length * _PARTS + 1e-9).astype(np.int64)
     block = part // _PARTS
@@ -147,7 +165,7 @@ def _averaged(
         if measurement.sigma is None:
             sigmas.append(np.full(number, noise))
         else:
-            stated = means(measurement.sigma[measurement.seen, k] ** 2)
+            stated = means(measurement.sigma[whole, k] ** 2)
             sigmas.append(np.maximum(np.sqrt(stated / least), noise))
     bent = np.zeros(number, dtype=bool)
     bent[inside] = True
@@ -159,7 +177,7 @@ def _averaged(
     rows = np.concatenate([rest[:1], rest])
     rho = measurement.rho
     if rho is not None:
-        rho = np.column_stack([means(own) for own in rho[measurement.seen].T])[rows]
+        rho = np.column_stack([means(own) for own in rho[whole].T])[rows]
     meta = dict(measurement.meta)
     if is_encoder(measurement):  # means lie on no lattice, by which it would be told
         meta["sensor"] = "encoder"

@@ -15,8 +15,11 @@ mod dry_friction;
 mod eccentric_mass;
 mod formula;
 mod lateral_slip;
+mod load_coulomb;
 mod load_drive;
 mod load_friction;
+mod local_brake;
+mod power_drag;
 mod quadratic_drag;
 mod radial_friction;
 mod radial_slip;
@@ -24,8 +27,10 @@ mod relaxation;
 mod slip;
 mod stribeck;
 mod term;
+mod threshold_drag;
 mod tilt;
 mod uneven_disk;
+mod warming_friction;
 mod wheel_ripple;
 
 pub use dry_friction::{Contact, Dry, FrictionModel};
@@ -168,6 +173,8 @@ pub enum Role {
     Shape(&'static [f64]),
     /// A frequency in Hz that a scan of candidates searches.
     Frequency,
+    /// A number that a scan of candidates searches: an `angle`, a `speed`, a `power` or a `duration`.
+    Scanned(&'static str),
 }
 
 /// One parameter of an effect.
@@ -201,6 +208,11 @@ impl EffectParameter {
     /// A frequency, with the value taken by default.
     pub const fn frequency(name: &'static str, unit: &'static str, default: f64) -> Self {
         Self::new(name, unit, default, Role::Frequency)
+    }
+
+    /// A number that a scan searches, with what it is and the value taken by default.
+    pub const fn scanned(name: &'static str, unit: &'static str, default: f64, what: &'static str) -> Self {
+        Self::new(name, unit, default, Role::Scanned(what))
     }
 
     /// The same with a physical range.
@@ -312,4 +324,9 @@ library! {
     cable_torque::CableTorque,
     constant_torque::ConstantTorque,
     radial_friction::RadialFriction,
+    power_drag::PowerDrag,
+    threshold_drag::ThresholdDrag,
+    load_coulomb::LoadCoulomb,
+    warming_friction::WarmingFriction,
+    local_brake::LocalBrake,
 }

@@ -44,6 +44,11 @@ class Candidate:
         return sum(p.sought for p in self.effect.spec.parameters)
 
     @property
+    def scanned(self) -> int:
+        """How many numbers a scan chose for it: it can look like laws that have none."""
+        return sum(p.role == "scanned" for p in self.effect.spec.parameters)
+
+    @property
     def amplitude_names(self) -> list[str]:
         """The amplitudes' names among a model's parameters."""
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]

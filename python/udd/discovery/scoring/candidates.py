@@ -33,24 +33,26 @@ def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
 def library(
     model: Model, given: Sequence[Candidate] = (), states: NDArray[np.float64] | None = None
 ) -> list[Candidate]:
-    """Every effect that can be added to a model, in each of its variants, but for scanned frequencies.
+    """Every effect that can be added to a model, in each of its variants, but for those that are scanned.
 
     Those of a user's own model are made of its states (:mod:`udd.discovery.scoring.term_library`), and dry
     friction where a motion, (n, d), says how wide its turn may be; those given come first. Terms that the
     free parameters absorb are not sorted out here: that shows in the data.
     """
     if isinstance(model, FormulaModel):
+        from .friction_terms import load_frictions
         from .term_library import delays, dry, terms, thresholds
 
         there = {effect.name for effect in model.effects}
         turning = [] if states is None else [*dry(model, states), *thresholds(model, states)]
+        turning += [] if states is None else load_frictions(model, states)
         listed = [c for c in (*given, *terms(model), *delays(model), *turning) if c.effect.name not in there]
         return list({(c.effect.name, c.effect.values): c for c in listed}.values())
     result = []
     for spec in effects.library():
         if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:
             continue
-        if any(p.role == "frequency" for p in spec.parameters):
+        if any(p.role in ("frequency", "scanned") for p in spec.parameters):
             continue
         shapes = [p for p in spec.parameters if p.role == "shape"]
         for momentum in spec.momenta or (None,):

@@ -75,9 +75,10 @@ class Scan:
         """Two candidates with the fall of chi2 that both together give, largest first.
 
         At most so many pairs, and how many there are. Where there are millions only those of the candidates
-        that alone give most are looked at; the others count, too, as the data chose which.
+        that alone give most are looked at; the others count, too, as the data chose which. What a scan chose
+        the value of is in none: beside another law it looks like a third.
         """
-        told_apart = [k for k, s in enumerate(self.scored) if not s.absorbed]
+        told_apart = [k for k, s in enumerate(self.scored) if not (s.absorbed or s.candidate.scanned)]
         usable = self._strongest(told_apart)
         # Candidates that act alike have no place side by side.
         unit = _unit(self.information)
@@ -147,7 +148,7 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
         first += len(own)
         columns.append(own)
         block = information[np.ix_(own, own)]
-        scored.append(_score(candidate, gradient[own], block, alone[own], scatter))
+        scored.append(score_of(candidate, gradient[own], block, alone[own], scatter))
     return Scan(scored, gradient, information, columns, scatter)
 
 
@@ -177,7 +178,7 @@ def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
     frequencies = [c.effect.parameters["f"] for c in candidates]
     scores = _core.score_ripples(fit.problem.at(fit.point), frequencies)
     scatter = max(fit.scatter, 1.0)
-    return [_score(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
+    return [score_of(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
 
 
 def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
@@ -202,17 +203,18 @@ def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
             gradient, information, alone = (
                 scatter * part for part in (score.gradient, score.information, score.alone)
             )
-            result.append(_score(one, gradient, information, alone, scatter))
+            result.append(score_of(one, gradient, information, alone, scatter))
     return result
 
 
-def _score(
+def score_of(
     candidate: Candidate,
     gradient: NDArray[np.float64],
     information: NDArray[np.float64],
     alone: NDArray[np.float64],
     scatter: float,
 ) -> Scored:
+    """What a score's gradient and information, in units of chi2, say of a candidate."""
     n = len(gradient)
     nothing = Scored(candidate, 0.0, 1.0, (0.0,) * n, (np.inf,) * n, True, True)
     own = np.diag(information)

@@ -47,7 +47,7 @@ def terms(model: FormulaModel) -> list[Candidate]:
     preferred by a prior penalty on the others. Where it has a mass matrix, all are forces along its
     coordinates, and those of machines act between two of them too.
     """
-    plain = [(text, _name(text), text) for text in _of_states(model)]
+    plain = [(text, word_for(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}
     rates = {name: text for name, text in rates.items() if name not in model.kinematic}
     result = [force for along in _ways(model) for force in _machines(model, along)]
@@ -65,12 +65,12 @@ def terms(model: FormulaModel) -> list[Candidate]:
 def delays(model: FormulaModel) -> list[Candidate]:
     """The delay of every measured input that has none: felt later, or seen later where it is negative."""
     late = model.late
-    (tau,) = _unused(model, "tau")
+    (tau,) = unused_names(model, "tau")
     result = []
     for name in model.inputs:
         if name not in late:
             title = f"delay of {name}"
-            spec = written(f"delay({name})", tau, _name(title), title, [tau], None, (tau,))
+            spec = written(f"delay({name})", tau, word_for(title), title, [tau], None, (tau,))
             result.append(Candidate(effects.Effect(spec.name, (0.0,), made=spec), title))
     return result
 
@@ -100,7 +100,7 @@ def _own_forces(model: FormulaModel, x: str) -> set[str]:
 def _machines(model: FormulaModel, along: str) -> list[Candidate]:
     """Forces as machines have them, but for dry friction, along a coordinate or between two."""
     v, where = _along(model, along)
-    (c,) = _unused(model, "c")
+    (c,) = unused_names(model, "c")
     brake, either = (0.0, np.inf), (-np.inf, np.inf)
     listed = [
         ("viscous friction", f"-{c}*{v}", brake),
@@ -116,7 +116,7 @@ def _machines(model: FormulaModel, along: str) -> list[Candidate]:
     result = []
     for kind, text, limits in listed:
         title = f"{kind} {where}"
-        name = _name(title)
+        name = word_for(title)
         spec = written(f"force({along})", text, name, title, [c], {c: limits}, (c,))
         form = kind if limits is brake else ""
         result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title, form=form))
@@ -181,7 +181,7 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
         for text, said, values in speeds:
             # What is another body's may drive this one.
             low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
-            name, title = f"dry_{_name(said)}_in_{state}", f"dry friction of {said} in {state}'"
+            name, title = f"dry_{word_for(said)}_in_{state}", f"dry friction of {said} in {state}'"
             inner = text if text.isidentifier() else f"({text})"
             result += _turning(model, f"{state}'", f"tanh({inner}/{{b}})", name, title, values, low_high)
     return result
@@ -223,7 +223,7 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
                 continue  # what stays on one side of zero does not show a zone about it
             for kind, term, limits in _IN_INPUT if x in model.inputs else _IN_PLACE:
                 title = f"{kind} of {x} in {slot}"
-                name = f"{_name(kind)}_of_{x}_in_{_place(slot)}"
+                name = f"{word_for(kind)}_of_{x}_in_{_place(slot)}"
                 made = (model, slot, term.replace("{x}", x), name, title, values, limits)
                 result += _turning(*made, _BOUNDS, "shape")
     return result
@@ -234,7 +234,7 @@ def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candid
     for along in _ways(model):
         v, where = _along(model, along)
         columns = [states[:, model.state_names.index(model.speeds[x])] for x in along.split(" - ")]
-        name, title = _name(f"dry {where}"), f"dry friction {where}"
+        name, title = word_for(f"dry {where}"), f"dry friction {where}"
         speed = reduce(np.subtract, columns)
         made = (model, f"force({along})", f"tanh({v}/{{b}})", name, title, speed, (-np.inf, 0.0))
         result += [replace(c, form="dry") for c in _turning(*made)]
@@ -266,7 +266,7 @@ def _turning(
     typical = _typical(argument)
     if not typical > 0.0:
         return []
-    c, b = _unused(model, "c", "eps" if role == "width" else "b")
+    c, b = unused_names(model, "c", "eps" if role == "width" else "b")
     ranges = {c: limits, b: (0.0, np.inf)}
     spec = written(slot, f"{c}*{term.replace('{b}', b)}", name, title, [c], ranges, (c, b))
     values = tuple(w * typical for w in widths)
@@ -294,14 +294,14 @@ def given_terms(model: FormulaModel, given: Iterable[tuple[str, Expression]]) ->
                 f"there is no equation of {state!r} for the candidate {term!r}; there are "
                 f"{', '.join(model.state_names)}"
             )
-        candidate = _candidate(model, slot, f"({term})", _name(term), term)
+        candidate = _candidate(model, slot, f"({term})", word_for(term), term)
         candidate.added_to(model)  # which parses it
         result.append(candidate)
     return result
 
 
 def _candidate(model: FormulaModel, slot: str, text: str, name: str, said: str) -> Candidate:
-    (amplitude,) = _unused(model, "c")
+    (amplitude,) = unused_names(model, "c")
     term = amplitude if text == "1" else f"{amplitude}*{text}"
     title = f"{said} in {slot}"
     values: dict[str, Any] = {amplitude: 0.0}
@@ -311,7 +311,7 @@ def _candidate(model: FormulaModel, slot: str, text: str, name: str, said: str) 
 
 def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
     """A drive of each frequency in each equation that says more than what another state's rate is."""
-    a, b, f = _unused(model, "a", "b", "f")
+    a, b, f = unused_names(model, "a", "b", "f")
     text = f"{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
     result = []
     for slot in slots(model):
@@ -327,10 +327,10 @@ def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
 
 def _place(slot: str) -> str:
     """A slot as a part of a name."""
-    return _name(slot.removesuffix("'"))
+    return word_for(slot.removesuffix("'"))
 
 
-def _unused(model: FormulaModel, *wanted: str) -> list[str]:
+def unused_names(model: FormulaModel, *wanted: str) -> list[str]:
     """Names for a term's parameters that mean nothing in the model."""
     taken = {*model.state_names, *dict(model.values), *model.inputs, "t", "pi"}
     return [
@@ -358,7 +358,7 @@ def _product(names: tuple[str, ...]) -> str:
     return "*".join(name if k == 1 else f"{name}^{k}" for name, k in counted.items()) or "1"
 
 
-def _name(text: str) -> str:
+def word_for(text: str) -> str:
     """A word that says what a term is."""
     if text == "1":
         return "constant"

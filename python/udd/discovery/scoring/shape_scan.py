@@ -1,0 +1,126 @@
+"""Effects with a place, a power or a time of their own: the best value, by scores from one response."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import effects
+from udd.effects import Effect
+from udd.errors import ModelError
+from udd.fitting import Fit
+from udd.models import Model
+from udd.models.formula_model import FormulaModel
+
+from .candidate import Candidate
+from .forcing import Responses, responses, score_forcings
+from .friction_terms import DURATIONS, POWERS, frictions, places, speeds
+from .score_scan import Scored, score_of
+
+Array = NDArray[np.float64]
+
+_AT_ONCE = 100  # scored at a time: what a long record takes in memory
+
+
+def strongest_shapes(fit: Fit) -> tuple[list[Scored], int]:
+    """Score each effect that has a number to be scanned at each of its values.
+
+    Returns
+    -------
+    strongest : list of Scored
+        One for each effect, two with a place: a pendulum passes a place on either side alike.
+    number : int
+        How many were scored.
+    """
+    moved = responses(fit)
+    strongest, number = [], 0
+    for listed in _candidates(fit):
+        some = _scored(fit, moved, listed)
+        number += len(some)
+        strongest += _best(some)
+    return strongest, number
+
+
+def _best(some: Sequence[Scored]) -> list[Scored]:
+    """The strongest, and of an effect with a place and a width the strongest that is elsewhere."""
+    if not some:
+        return []
+    first = max(some, key=lambda s: s.chi2)
+    where, *widths = _shape_values(first)
+    if not widths:
+        return [first]
+    # Without this a brake is placed at -0.15 rad that stands at 0.15 rad.
+    others = [s for s in some if abs(_shape_values(s)[0] - where) > 2 * max(widths[0], _shape_values(s)[1])]
+    return [first, max(others, key=lambda s: s.chi2)] if others else [first]
+
+
+def _shape_values(scored: Scored) -> list[float]:
+    """An effect's scanned number, then its widths."""
+    effect = scored.candidate.effect
+    return [effect.parameters[p.name] for p in effect.spec.parameters if p.role in ("scanned", "shape")]
+
+
+def _candidates(fit: Fit) -> Iterator[list[Candidate]]:
+    """What is tried of each effect."""
+    model, duration = fit.model, float(np.ptp(fit.record.t))
+    there = {effect.name for effect in model.effects}
+    if isinstance(model, FormulaModel):
+        yield from (c for c in frictions(model, fit.states, duration) if c[0].effect.name not in there)
+        return
+    for spec in effects.library():
+        scanned = next((p for p in spec.parameters if p.role == "scanned"), None)
+        if scanned is None or spec.name in there or model.kind not in spec.bodies:
+            continue
+        shapes = [p for p in spec.parameters if p.role == "shape"]
+        names = [scanned.name, *(p.name for p in shapes)]
+        listed = []
+        for widths in itertools.product(*(p.grid for p in shapes)):
+            for value in _values(scanned.along, model, fit.states, duration, *widths):
+                made: dict[str, Any] = dict(zip(names, (value, *widths), strict=True))
+                said = ", ".join(f"{name} = {number:.3g}" for name, number in made.items())
+                listed.append(Candidate(spec.make(**made), f"{spec.title} ({said})"))
+        yield listed
+
+
+def _values(along: str, model: Model, states: Array, duration: float, width: float = 0.0) -> Sequence[float]:
+    """What is tried of a number of the library's, by what it is."""
+    if along == "power":
+        return POWERS
+    if along == "duration":
+        return [share * duration for share in DURATIONS]
+    if along == "speed":
+        return speeds(states[:, model.state_names.index("Omega")])
+    return places(states[:, model.state_names.index(model.angles[0])], width, angle=True)
+
+
+def _scored(fit: Fit, moved: Responses, listed: Sequence[Candidate]) -> list[Scored]:
+    """Score candidates of one effect, which differ in its shapes alone."""
+    scatter, result = max(fit.scatter, 1.0), []
+    for first in range(0, len(listed), _AT_ONCE):
+        columns = [(one, _column(moved, one.effect)) for one in listed[first : first + _AT_ONCE]]
+        usable = [(one, column) for one, column in columns if column is not None]
+        scores = score_forcings(fit, [column for _one, column in usable])
+        for (one, _column_of), score in zip(usable, scores, strict=True):
+            gradient, information, alone = (
+                scatter * part for part in (score.gradient, score.information, score.alone)
+            )
+            result.append(score_of(one, gradient, information, alone, scatter))
+    return result
+
+
+def _column(moved: Responses, effect: Effect) -> Array | None:
+    """What a unit amplitude adds to the state at every link's end, (n, d, 1); None if it has no value."""
+    (name,) = effect.amplitudes
+    added = np.zeros(moved.states.shape)
+    for model, film in zip(moved.fit.models, moved.films, strict=True):
+        more = model.with_effects((*model.effects, effect.replace(**{name: 1.0})))
+        try:
+            added[film] = more.rates(moved.t[film], moved.states[film]) - moved.rates[film]
+        except ModelError:
+            return None
+    column: Array = np.einsum("iqdm,iqm->id", moved.response, added)[..., None]
+    return column

@@ -1,0 +1,153 @@
+"""Friction with a place, a power, a time or a load of its own: named if it is there, silent if it is not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import udd
+from udd.discovery.proposals import Proposals
+from udd.discovery.score_rounds import ScoreRound, score_round
+from udd.discovery.scoring.shape_scan import strongest_shapes
+from udd.discovery.time_budget import Clock
+from udd.discovery.trial_fits import of_library
+from udd.fitting import fit_record, record_of
+
+E = udd.effects
+
+
+def seen(truth: Any, duration: float = 60.0, start: float = 1.0, noise: float = 5e-3) -> udd.Measurement:
+    """A pendulum's angle 30 times a second, with so much noise."""
+    t = np.arange(0, duration, 1 / 30)
+    theta = udd.simulate(truth, t, [0.0, start]).state[:, 1]
+    return udd.Measurement(t, {"theta": theta + noise * np.random.default_rng(0).standard_normal(len(t))})
+
+
+def scored(measured: udd.Measurement, model: Any) -> ScoreRound:
+    """The scores around the known model's fit, as a search begins with it."""
+    return score_round(fit_record(measured, record_of(measured, model), model, search=True))
+
+
+def scores(law: udd.effects.Effect) -> ScoreRound:
+    plain = udd.Pendulum(0.5, k0=0.01)
+    return scored(seen(plain.with_effects([law]), noise=1e-3), plain)
+
+
+#: Weak, so that scores are exact, and seen with little noise.
+LAWS = [
+    E.local_brake(a=0.005, c=0.15, s=0.08),
+    E.power_drag(a=0.001, n=0.5),
+    E.threshold_drag(a=0.001, c=1.5),
+    E.warming_friction(a=0.001, tau=30.0),
+    E.warming_friction(a=-0.001, tau=15.0),
+    E.load_coulomb(f=0.0004),
+]
+
+
+def best_of(found: ScoreRound, name: str) -> float:
+    """The score of a law, in units of the best score."""
+    usable = found.usable()
+    most = max(s.chi2 for s in usable)
+    return (
+        max((s.chi2 for s in usable if name in (s.candidate.effect.name, s.candidate.title)), default=0.0)
+        / most
+    )
+
+
+@pytest.mark.parametrize("law", LAWS, ids=repr)
+def test_the_law_scores_as_high_as_any(law):
+    assert best_of(scores(law), law.name) > 0.99
+
+
+@pytest.mark.parametrize(
+    "law",
+    [E.quadratic_drag(c=8e-4), E.cubic_drag(c=2e-4), E.coulomb(c=3e-4), E.stribeck(c=6e-4, fade=1.0)],
+    ids=repr,
+)
+def test_a_free_number_does_not_come_before_the_right_law(law):
+    assert scores(law).usable()[0].candidate.effect.name == law.name
+
+
+def test_a_power_that_explains_hardly_more_is_not_tried_further():
+    plain, truth = udd.Pendulum(0.5, k0=0.01), E.quadratic_drag(c=0.008)
+    found = scored(seen(plain.with_effects([truth]), duration=20.0), plain)
+    assert any(s.candidate.effect.name == "power_drag" for s in found.passing())
+    proposals = Proposals(found.fit, found, Clock(None, lambda _text: None))
+    tried = {t.candidates[0].effect.name for t in proposals._singles(found.passing())}
+    assert "quadratic_drag" in tried and not tried & {"power_drag", "threshold_drag", "local_brake"}
+
+
+def test_scanned_values_score_as_their_full_derivatives_do():
+    found = scores(E.local_brake(a=0.005, c=0.15, s=0.08))
+    strongest, number = strongest_shapes(found.fit)
+    listed = {s.candidate: s for s in found.library.scored}
+    assert len(strongest) == 5
+    assert {s.candidate.effect.name for s in strongest} == {
+        "local_brake",
+        "power_drag",
+        "threshold_drag",
+        "warming_friction",
+    }
+    assert number > 40
+    for one in strongest:
+        # Within a frame the motion is followed at a few places.
+        assert one.chi2 == pytest.approx(listed[one.candidate].chi2, rel=1e-3, abs=1e-2)
+    brake = next(s for s in strongest if s.candidate.effect.name == "local_brake")
+    assert abs(brake.candidate.effect.parameters["c"] - 0.15) < 0.1
+
+
+def test_a_fit_gives_a_brake_s_place_and_width():
+    plain = udd.Pendulum(0.5, k0=0.01)
+    found = scored(seen(plain.with_effects([E.local_brake(a=0.05, c=0.15, s=0.08)])), plain)
+    # A place on the other side is tried too: a symmetric swing passes both alike.
+    first, second = (s for s in found.usable() if s.candidate.effect.name == "local_brake")
+    trials = [of_library(found.fit, [s.candidate], list(s.amplitudes)) for s in (first, second)]
+    trial = min((t for t in trials if t), key=lambda t: t.rank)
+    assert first.candidate.parameters == 3
+    for name, value in (("a", 0.05), ("c", 0.15), ("s", 0.08)):
+        error = trial.fit.errors[f"local_brake.{name}"]
+        assert abs(trial.fit.parameters[f"local_brake.{name}"] - value) < 4 * error < 0.3 * max(value, 0.1), (
+            name
+        )
+
+
+OWN = udd.Model(["theta", "v"], ["v", "-w2*sin(theta) - c*v"], {"w2": 19.62, "c": 0.04}, angles=["theta"])
+
+
+@pytest.mark.parametrize(
+    ("term", "size", "title"),
+    [
+        ("-exp(-((theta - 0.15)/0.08)^2)*v", 0.02, "friction near a place of theta in v'"),
+        ("-exp(-t/20)*v", 0.005, "friction that settles with time in v'"),
+        (
+            "-(19.62*cos(theta) + v^2)*tanh(v/0.05)",
+            1e-3,
+            "dry friction growing with the load in v'",
+        ),
+        ("-tanh(v/0.05)", 0.01, "dry friction of v in v'"),
+    ],
+)
+def test_the_same_laws_are_tried_in_models_of_one_s_own(term, size, title):
+    truth = OWN.with_term("v", term, size=size)
+    t = np.arange(0, 24, 0.05)
+    theta = udd.simulate(truth, t, [1.0, 0.0]).theta
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    found = scored(udd.Measurement(t, {"theta": theta + noise}), OWN)
+    assert best_of(found, title) > 0.99
+
+
+def test_a_cart_s_places_are_within_its_way():
+    cart = udd.mechanism({"x": "u"}, [["m"]], ["-k*x - c*u"], {"m": 2.0, "k": 8.0, "c": 0.1})
+    t = np.arange(0, 20, 0.04)
+    x = udd.simulate(
+        cart.with_effects([E.formula("force(x)", "-b*exp(-((x - 0.3)/0.1)^2)*u", b=1.0)]), t, [1.0, 0.0]
+    ).x
+    noise = 2e-3 * np.random.default_rng(0).standard_normal(len(t))
+    fit = udd.fit(udd.Measurement(t, {"x": x + noise}), cart, free=["k", "c"])
+    strongest, _number = strongest_shapes(fit)
+    best = max(strongest, key=lambda s: s.chi2)
+    assert best.candidate.title == "friction near a place of x in force(x)"
+    assert abs(best.candidate.effect.parameters["b"] - 0.3) < 0.15
+    assert not [s for s in strongest if not -1.1 < s.candidate.effect.parameters.get("b", 0.0) < 2.5]
