@@ -31,6 +31,7 @@ AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
 PATCH = 5  # pixels about a point whose light is compared
 WINDOW = 15  # pixels
 KNOWN = 0.8  # share of the pictures whose view is known; with less, the points are not the background's
+PLACED, TURNED = 0.02, 0.06  # pixels, at the middle and at the corner: what resampling costs at least
 UNSURE = 0.06  # pixels: a view known no better is none
 UNLIKE = 0.03  # relative difference of light that is evened out before points are followed
 ZOOMS = tuple(1.12**k for k in (1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6))  # that are tried if all else fails
@@ -101,7 +102,8 @@ class CameraMotion:
             ratio = np.nanmax(self.gain) / np.nanmin(self.gain)
             said.append(f"the light of the pictures changes by a factor of {ratio:.2f}")
         lost = int((~self.known).sum())
-        rest = f", but for {lost} frames without a background" if lost and not self.steady else ""
+        frames = "one frame" if lost == 1 else f"{lost} frames"
+        rest = f", but for {frames} without a background" if lost and not self.steady else ""
         return f"{' and '.join(said)}: what stands still about the disk shows it, and it is undone{rest}"
 
     @property
@@ -124,6 +126,7 @@ class CameraMotion:
         """Standard errors (n, 3) of u, v and beta of a disk at these places, one array for each cause."""
         arm = at - self.middle
         u, v, turn = np.nan_to_num(self.sigma[: len(at)]).T
+        u, v, turn = np.hypot(u, PLACED), np.hypot(v, PLACED), np.hypot(turn, TURNED / abs(self.middle))
         return [
             np.column_stack([u, 0 * turn, 0 * turn]),
             np.column_stack([0 * turn, v, 0 * turn]),
