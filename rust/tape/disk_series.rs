@@ -11,6 +11,7 @@
 use super::jet::{HIGH, LOW};
 use super::node::INVERSE;
 use super::series::{Coefficient, inner, orders};
+use super::specialised::Held;
 use crate::model::Sides;
 use crate::scalar::{InstructionSet, Isa, Packet, Real, Scalar};
 use crate::unroll::unroll;
@@ -27,7 +28,7 @@ const SLOTS: usize = 5;
 pub(super) fn expand<V: InstructionSet, S: Scalar, const D: usize, const N: usize>(
     work: &mut [[S; N]],
     order: usize,
-    held: &[S],
+    held: (&[S], &Held),
     x: &[S; D],
     sides: &Sides<S>,
 ) {
@@ -120,15 +121,16 @@ struct Law<S> {
 impl<S: Scalar> Law<S> {
     /// From the held values of the [tape](super::specialised).
     #[inline(always)]
-    fn of(held: &[S], sides: &Sides<S>) -> Self {
-        let (k0, k1, k2) = (held[3], held[1], held[2]);
+    fn of((held, at): (&[S], &Held), sides: &Sides<S>) -> Self {
+        let of = |place: usize| held[usize::from(at[place])];
+        let (k0, k1, k2) = (of(3), of(1), of(2));
         let fall = S::select(sides[REVERSAL], -k2, k2);
         Self {
-            g: held[0],
-            w: held[4],
+            g: of(0),
+            w: of(4),
             a: S::select(sides[KINK], k1, k0),
             b: S::select(sides[KINK], fall, S::zero()),
-            inertia: held[8],
+            inertia: of(8),
         }
     }
 }

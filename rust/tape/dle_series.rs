@@ -13,19 +13,18 @@ use super::series::{Number, half_square, inner, orders};
 use crate::scalar::{DerivativeLanes, InstructionSet, Isa, LANES, Packet, Real, Scalar, Spread};
 use crate::unroll::unroll;
 
-/// The coefficients of the solution up to this order, for the tape's held values.
+/// The coefficients of the solution up to this order, for the drive `w` and, with damping, `B w`.
 #[inline(always)]
 pub(super) fn expand<V: InstructionSet, S: Scalar, const D: usize, const N: usize>(
     work: &mut [[S; N]],
     order: usize,
-    held: &[S],
+    (w, damping): (S, Option<S>),
     x: &[S; D],
-    damped: bool,
 ) {
     let work: &mut [[S; N]; 3] = work.first_chunk_mut().expect("a slot for each component");
     let x = [x[0], x[1], x[2]];
-    if damped {
-        return rolled(&mut Series::of(work, x, held[0], Some(held[2])), order);
+    if damping.is_some() {
+        return rolled(&mut Series::of(work, x, w, damping), order);
     }
     if const { N == HIGH + 1 && !matches!(V::ISA, Isa::Baseline) } {
         let value = |x: S| x.real().lane(0);
@@ -34,7 +33,7 @@ pub(super) fn expand<V: InstructionSet, S: Scalar, const D: usize, const N: usiz
                 DerivativeLanes::<V>::new(value(x), [x.derivative(0), x.derivative(1), x.derivative(2)])
             };
             let back = |c: DerivativeLanes<V>| S::with_derivatives(c.number(), |i| c.derivative(i));
-            if aside(work, order, (held[0], x), fan, back) {
+            if aside(work, order, (w, x), fan, back) {
                 return;
             }
         }
@@ -44,22 +43,22 @@ pub(super) fn expand<V: InstructionSet, S: Scalar, const D: usize, const N: usiz
                 d: [Packet::from_lanes(|i| x.derivative(i))],
             };
             let back = |c: Spread<V>| S::with_derivatives(c.re.lane(0), |i| c.d[0].lane(i));
-            if aside(work, order, (held[0], x), spread, back) {
+            if aside(work, order, (w, x), spread, back) {
                 return;
             }
         }
     }
     if const { worthwhile::<S, N>() && !V::ISA.is_rare() } && matches!(order, LOW | HIGH) {
         if const { doubled::<S>() } {
-            return by_register(work, order, (held[0], x));
+            return by_register(work, order, (w, x));
         }
-        let series = &mut Series::of(work, x, held[0], None);
+        let series = &mut Series::of(work, x, w, None);
         return match order {
             LOW => unrolled::<_, N, LOW>(series, |_, _, _| {}),
             _ => unrolled::<_, N, HIGH>(series, |_, _, _| {}),
         };
     }
-    rolled(&mut Series::of(work, x, held[0], None), order);
+    rolled(&mut Series::of(work, x, w, None), order);
 }
 
 /// A step of two registers for each part, whose end waits less, but a series that fits into the registers.

@@ -114,12 +114,15 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
         if const { D == 3 }
-            && let Specialised::Dle { damped } = tape.known
+            && let Specialised::Dle { damped, held: at } = tape.known
         {
-            return dle_series::expand::<V, S, D, N>(work, order, held, x, damped);
+            let held = (held[usize::from(at[0])], damped.then(|| held[usize::from(at[2])]));
+            return dle_series::expand::<V, S, D, N>(work, order, held, x);
         }
-        if const { D == 4 } && tape.known == Specialised::Disk {
-            return disk_series::expand::<V, S, D, N>(work, order, held, x, sides);
+        if const { D == 4 }
+            && let Specialised::Disk(at) = &tape.known
+        {
+            return disk_series::expand::<V, S, D, N>(work, order, (held, at), x, sides);
         }
         unroll!(n in 0..D => { work[n][0] = x[n]; });
         let work = &mut work[..tape.slots];

@@ -2,25 +2,64 @@
 
 use super::{Node, Step, Tape};
 
-/// Whether a tape is one of the known ones.
+/// Whether a tape is one of the known ones, and where it holds what that one holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Specialised {
     Not,
-    Dle { damped: bool },
-    Disk,
+    Dle { damped: bool, held: Held },
+    Disk(Held),
 }
+
+/// For each value that a known tape holds, the number of the same one in another tape.
+pub(super) type Held = [u16; 9];
 
 impl Specialised {
     pub(super) fn of<const D: usize>(tape: &Tape<D>) -> Self {
-        let is = |steps: &[Step], rates: &[u16]| tape.steps == steps && tape.rates == *rates;
-        if is(DLE, DLE_RATES) {
-            Specialised::Dle { damped: false }
-        } else if is(DAMPED_DLE, DAMPED_DLE_RATES) {
-            Specialised::Dle { damped: true }
-        } else if is(DISK, DISK_RATES) {
-            Specialised::Disk
+        if let Some(held) = held_as_in(tape, DLE, DLE_RATES) {
+            Specialised::Dle { damped: false, held }
+        } else if let Some(held) = held_as_in(tape, DAMPED_DLE, DAMPED_DLE_RATES) {
+            Specialised::Dle { damped: true, held }
+        } else if let Some(held) = held_as_in(tape, DISK, DISK_RATES) {
+            Specialised::Disk(held)
         } else {
             Specialised::Not
+        }
+    }
+}
+
+/// Where a tape holds the values of these steps, if they are its own but for the numbers of what is held.
+fn held_as_in<const D: usize>(tape: &Tape<D>, steps: &[Step], rates: &[u16]) -> Option<Held> {
+    if tape.rates != *rates || tape.steps.len() != steps.len() {
+        return None;
+    }
+    let mut held = [u16::MAX; 9];
+    for (own, wanted) in tape.steps.iter().zip(steps) {
+        let ((own_node, own_held), (node, place)) = (own.node.parted(), wanted.node.parted());
+        if own.to != wanted.to || own_node != node {
+            return None;
+        }
+        if let (Some(own), Some(place)) = (own_held, place) {
+            let known = &mut held[usize::from(place)];
+            if *known != u16::MAX && *known != own {
+                return None;
+            }
+            *known = own;
+        }
+    }
+    Some(held)
+}
+
+impl Node {
+    /// The operation without the number of what it takes from the held values, and that number.
+    fn parted(self) -> (Self, Option<u16>) {
+        match self {
+            Node::Hold(h) => (Node::Hold(0), Some(h)),
+            Node::Plus(a, h) => (Node::Plus(a, 0), Some(h)),
+            Node::Minus(a, h) => (Node::Minus(a, 0), Some(h)),
+            Node::Scale(a, h) => (Node::Scale(a, 0), Some(h)),
+            Node::From(h, a) => (Node::From(0, a), Some(h)),
+            Node::Over(h, a) => (Node::Over(0, a), Some(h)),
+            node => (node, None),
         }
     }
 }

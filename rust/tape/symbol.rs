@@ -97,6 +97,8 @@ pub(super) struct Recording {
     pub(super) made: Vec<Made>,
     /// Whether it changes along a solution.
     pub(super) varies: Vec<bool>,
+    /// By how it was made, whatever was made before it.
+    ranks: Vec<Rank>,
     known: HashMap<Made, Symbol>,
     /// The model looked at a value, which a recording does not have.
     pub(super) looked: bool,
@@ -124,9 +126,23 @@ fn looked() {
     RECORDING.with_borrow_mut(|r| r.looked = true);
 }
 
-/// Sums and products do not depend on the order of their operands.
-fn ordered(a: Symbol, b: Symbol) -> (Symbol, Symbol) {
-    if b.0 < a.0 { (b, a) } else { (a, b) }
+/// What the operands of sums and products are ordered by: the components of the state come first, then what is made of
+/// most operations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Rank {
+    kind: u64,
+    lightness: u64,
+    hash: u64,
+}
+
+/// Numbers mixed to one, the same on every machine.
+fn mixed(numbers: [u64; 4]) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for number in numbers {
+        hash = (hash ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        hash ^= hash >> 29;
+    }
+    hash
 }
 
 impl Recording {
@@ -145,8 +161,46 @@ impl Recording {
         let symbol = Symbol(u32::try_from(self.made.len()).expect("fewer than 2^32 symbols"));
         self.made.push(made);
         self.varies.push(varies);
+        self.ranks.push(self.rank(made));
         self.known.insert(made, symbol);
         symbol
+    }
+
+    /// That of a symbol made in this way.
+    fn rank(&self, made: Made) -> Rank {
+        let leaf = |kind: u64, n: u64| Rank { kind, lightness: n, hash: 0 };
+        let inner = |kind: u64, n: u64, of: [Option<Symbol>; 2]| {
+            let rank = |s: Option<Symbol>| s.map(|s| self.ranks[s.0 as usize]);
+            let weight = |rank: Option<Rank>| match rank {
+                Some(Rank { kind: 4, lightness, .. }) => u64::MAX - lightness,
+                Some(_) => 1,
+                None => 0,
+            };
+            let hash = |rank: Option<Rank>| rank.map_or(0, |r| mixed([r.kind, r.lightness, r.hash, 1]));
+            let [a, b] = of.map(rank);
+            let all = weight(a).saturating_add(weight(b)).saturating_add(1);
+            Rank { kind: 4, lightness: u64::MAX - all, hash: mixed([kind, n, hash(a), hash(b)]) }
+        };
+        match made {
+            Made::State(n) => leaf(0, n as u64),
+            Made::Time => leaf(1, 0),
+            Made::Input(k) => leaf(2, k as u64),
+            Made::Parameter(i) => leaf(3, i as u64),
+            Made::Constant(bits) => Rank { kind: 5, lightness: bits, hash: 0 },
+            Made::Neg(a) => inner(1, 0, [Some(a), None]),
+            Made::Add(a, b) => inner(2, 0, [Some(a), Some(b)]),
+            Made::Sub(a, b) => inner(3, 0, [Some(a), Some(b)]),
+            Made::Mul(a, b) => inner(4, 0, [Some(a), Some(b)]),
+            Made::Div(a, b) => inner(5, 0, [Some(a), Some(b)]),
+            Made::Apply(function, a) => inner(6, function as u64, [Some(a), None]),
+            Made::Select(j, a, b) => inner(7, j as u64, [Some(a), Some(b)]),
+        }
+    }
+
+    /// Sums and products do not depend on the order of their operands.
+    fn ordered(&self, a: Symbol, b: Symbol) -> (Symbol, Symbol) {
+        let rank = |s: Symbol| (self.ranks[s.0 as usize], s.0);
+        if rank(b) < rank(a) { (b, a) } else { (a, b) }
     }
 
     fn of(&self, s: Symbol) -> Made {
@@ -171,6 +225,17 @@ impl Recording {
             Made::Mul(x, f) if self.varies[x.0 as usize] && !self.varies[f.0 as usize] => Some((x, f)),
             _ => None,
         }
+    }
+
+    /// The negative of a symbol that is scaled by a negative factor: sums of it are written as differences.
+    fn flipped(&mut self, s: Symbol) -> Option<Symbol> {
+        let (x, f) = self.scaled(s)?;
+        let factor = match (self.of(f), self.value(f)) {
+            (Made::Neg(factor), _) => factor,
+            (_, Some(value)) if value < 0.0 => self.constant(-value),
+            _ => return None,
+        };
+        Some(self.mul(x, factor))
     }
 
     fn neg(&mut self, a: Symbol) -> Symbol {
@@ -199,7 +264,13 @@ impl Recording {
             (_, Made::Neg(y)) => self.sub(a, y),
             (Made::Neg(x), _) => self.sub(b, x),
             _ => {
-                let (a, b) = ordered(a, b);
+                if let Some(y) = self.flipped(b) {
+                    return self.sub(a, y);
+                }
+                if let Some(x) = self.flipped(a) {
+                    return self.sub(b, x);
+                }
+                let (a, b) = self.ordered(a, b);
                 self.make(Made::Add(a, b))
             }
         }
@@ -219,7 +290,10 @@ impl Recording {
                 let sum = self.add(x, b);
                 self.neg(sum)
             }
-            _ => self.make(Made::Sub(a, b)),
+            _ => match self.flipped(b) {
+                Some(y) => self.add(a, y),
+                None => self.make(Made::Sub(a, b)),
+            },
         }
     }
 
@@ -259,7 +333,7 @@ impl Recording {
             (false, true) => self.make(Made::Mul(b, a)),
             (true, false) => self.make(Made::Mul(a, b)),
             _ => {
-                let (a, b) = ordered(a, b);
+                let (a, b) = self.ordered(a, b);
                 self.make(Made::Mul(a, b))
             }
         }

@@ -228,8 +228,6 @@ fn what_is_no_effect_is_refused() {
         assert!(found.contains(wanted), "{text}: {found}");
     }
     assert!(mistake(Slot::Vertical, "c*theta", &["c"], &["c"]).contains("mixes"));
-    let open = format!("c*({}Z{}", "1 + (Z*".repeat(40), ")".repeat(41));
-    assert!(mistake(Slot::Torque, &open, &["c"], &["c"]).contains("open at once"));
     // What is linear in all of its amplitudes together is one.
     assert!(formula(Slot::Torque, "-(a*Z - Y*b/(1 + n^2))*2", &["a", "b", "n"], &["a", "b"]).is_ok());
     assert!(formula(Slot::Torque, "sin(t)*Z", &[], &[]).is_ok());
@@ -255,6 +253,38 @@ fn a_model_as_text_has_the_tape_of_the_compiled_one() {
         rates(&dle().build(&[1.7, 0.2]), 0.0, &x).map(f64::to_bits),
         rates(&DleFamily.build(&[1.7, 0.2]), 0.0, &x).map(f64::to_bits)
     );
+}
+
+/// So is the disk, whatever the order of the operands and however its numbers are named.
+#[test]
+fn the_disk_in_other_words_has_its_series() {
+    let parameters = names(&["W", "k0", "k1", "k2", "g", "R"]);
+    let states = names(&["Omega", "Y", "Z", "beta"]);
+    let record = |texts: [&str; 4]| {
+        let family = FormulaFamily::<4>::parse(&states, &texts, &parameters, &[]).unwrap();
+        Tape::record(&family, &[None; 6]).unwrap()
+    };
+    let one = record([
+        "(g*Y - max(k1 - k2*abs(Omega), k0)*Omega - W*Z*Omega)/(R^2/2 + Y^2 + Z^2)",
+        "Z*Omega",
+        "W - Y*Omega",
+        "Omega",
+    ]);
+    let other = record([
+        "(Y*g - Omega*max(-abs(Omega)*k2 + k1, k0) - Omega*(Z*W))/(Z*Z + (Y^2 + 0.5*R*R))",
+        "Omega*Z",
+        "-(Omega*Y) + W",
+        "Omega",
+    ]);
+    assert!(one.is_unrolled() && other.is_unrolled());
+    // Another drive in one of the equations is another law.
+    let mixed = record([
+        "(g*Y - max(k1 - k2*abs(Omega), k0)*Omega - W*Z*Omega)/(R^2/2 + Y^2 + Z^2)",
+        "Z*Omega",
+        "g - Y*Omega",
+        "Omega",
+    ]);
+    assert!(!mixed.is_unrolled());
 }
 
 #[test]
