@@ -41,6 +41,7 @@ class _Run(TypedDict):
     event_state: _Floats
     outcome: str
     counts: tuple[int, int, int, int]
+    method: str
     dense: Dense | None
 
 class _Orbits(TypedDict):

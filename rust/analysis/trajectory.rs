@@ -35,8 +35,8 @@ impl Outcome {
 pub enum Output<'a> {
     /// At these times; they increase, and the first is the time of the initial state.
     At(&'a [f64]),
-    /// From the first time to the second, after every accepted step.
-    Steps(f64, f64),
+    /// From the first time to the second, after every accepted step; along a power series at so many places of each.
+    Steps(f64, f64, usize),
 }
 
 /// A run that has ended.
@@ -65,7 +65,7 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
 ) -> Result<Run<D>, Failure> {
     let start = match output {
         Output::At(times) => times.first().copied().unwrap_or(0.0),
-        Output::Steps(start, _) => start,
+        Output::Steps(start, ..) => start,
     };
     let mut run = Integrator::by(method, system, start, x0, None, tolerance).with_wall();
     sampled(&mut run, output, keep, watched)
@@ -79,9 +79,9 @@ fn sampled<const D: usize>(
     (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
 ) -> Result<Run<D>, Failure> {
     let (start, x0) = (run.t(), *run.x());
-    let (times, end) = match output {
-        Output::At(times) => (times, times.last().copied().unwrap_or(start)),
-        Output::Steps(_, end) => (&[][..], end),
+    let (times, end, places) = match output {
+        Output::At(times) => (times, times.last().copied().unwrap_or(start), 1),
+        Output::Steps(_, end, places) => (&[][..], end, if run.is_series() { places } else { 1 }),
     };
     let mut samples = Samples::new(times, x0);
     let mut steps = (vec![start], vec![x0]);
@@ -92,8 +92,16 @@ fn sampled<const D: usize>(
         if times.is_empty() {
             // Two events can share a time.
             if run.t() > steps.0[steps.0.len() - 1] {
-                if !(memory::grow(&mut steps.0, 1) && memory::grow(&mut steps.1, 1)) {
+                if !(memory::grow(&mut steps.0, places) && memory::grow(&mut steps.1, places)) {
                     return Err(no_room(steps.0.len() * size_of::<[f64; D]>(), run.t(), (start, end)));
+                }
+                for k in 1..places {
+                    let dt = run.size() * (k as f64 / places as f64);
+                    let t = run.from() + dt;
+                    if steps.0[steps.0.len() - 1] < t && t < run.t() {
+                        steps.0.push(t);
+                        steps.1.push(run.dense(dt));
+                    }
                 }
                 steps.0.push(run.t());
                 steps.1.push(*run.x());

@@ -27,6 +27,8 @@ pub trait Steps<const D: usize> {
     fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
     /// As [`Method::stable`].
     fn stable(&self) -> f64;
+    /// As [`Method::SERIES`].
+    fn is_series(&self) -> bool;
 }
 
 impl<M, E, K, const D: usize> Steps<D> for Integrator<M, f64, D, E, K>
@@ -74,5 +76,8 @@ where
     }
     fn stable(&self) -> f64 {
         self.method().stable()
+    }
+    fn is_series(&self) -> bool {
+        K::SERIES
     }
 }

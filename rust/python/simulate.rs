@@ -17,6 +17,9 @@ use crate::model::{self, Family, System};
 use crate::observe::Record;
 use crate::scalar::{Isa, constants};
 
+/// By `auto` states are given at so many places of each step.
+const WITHIN: usize = 8;
+
 /// A finished run, its dimension forgotten: states are flat.
 struct Flat {
     dimension: usize,
@@ -26,6 +29,8 @@ struct Flat {
     event_t: Vec<f64>,
     event_x: Vec<f64>,
     outcome: &'static str,
+    /// The method that took the steps.
+    method: &'static str,
     counts: (u64, u64, u64, u64),
     record: Option<Box<dyn Piecewise>>,
 }
@@ -112,27 +117,30 @@ fn run<F: Family<D>, const D: usize>(
         let method = Taylor::new(tape, values.to_vec(), order, Isa::best());
         Some(trajectory(system(), method, output, x0, tolerance, keep, stop))
     };
-    let run = match by {
-        RunMethod::Rodas => rodas(),
+    let (method, run) = match by {
+        RunMethod::Rodas => ("rodas", rodas()),
         RunMethod::Explicit(MethodChoice::Dopri5) => {
-            trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop)
+            ("dopri5", trajectory(system(), Dopri5::default(), output, x0, tolerance, keep, stop))
         }
-        RunMethod::Explicit(MethodChoice::Dop853) => stages(),
+        RunMethod::Explicit(MethodChoice::Dop853) => ("dop853", stages()),
         RunMethod::Explicit(MethodChoice::Taylor) => {
             let message = "the model's law has a comparison or an arc tangent, which no power series follows here; use \
                            method=\"dop853\"";
-            series().ok_or_else(|| ModelError::new_err(message))?
+            ("taylor", series().ok_or_else(|| ModelError::new_err(message))?)
         }
         RunMethod::Explicit(MethodChoice::Auto) => match series() {
-            None => stages(),
-            Some(Err(failure)) if tape.as_ref().is_some_and(|tape| tape.hands_over(&failure)) => stages(),
-            Some(run) => run,
+            None => ("dop853", stages()),
+            Some(Err(failure)) if tape.as_ref().is_some_and(|tape| tape.hands_over(&failure)) => {
+                ("dop853", stages())
+            }
+            Some(run) => ("taylor", run),
         },
     };
-    let Run { t, x, events, outcome, counts, record } = match run {
-        Err(Failure::Stiff { .. }) => rodas()?,
-        run => run?,
+    let (method, run) = match run {
+        Err(Failure::Stiff { .. }) => ("rodas", rodas()),
+        run => (method, run),
     };
+    let Run { t, x, events, outcome, counts, record } = run?;
     let system = system();
     let (mut event_kinds, mut event_t, mut event_x) = (Vec::new(), Vec::new(), Vec::new());
     for event in &events {
@@ -148,6 +156,7 @@ fn run<F: Family<D>, const D: usize>(
         event_t,
         event_x,
         outcome: outcome.name(),
+        method,
         counts: (counts.accepted, counts.rejected, counts.evaluations, counts.grazes),
         record: record.map(|record| Box::new(Recorded { record, idle }) as Box<dyn Piecewise>),
     })
@@ -220,7 +229,9 @@ fn simulate<'py>(
         room_for(&format!("the states at {} times", times.len()), numbers * 8.0)?;
     }
     let times = times.map(<[f64]>::to_vec);
-    let output = times.as_deref().map_or(Output::Steps(0.0, end), Output::At);
+    // The long steps of a series are not looked at by their ends alone, unless it was asked for.
+    let within = if method == "auto" { WITHIN } else { 1 };
+    let output = times.as_deref().map_or(Output::Steps(0.0, end, within), Output::At);
     let flat = with_model!(&model, |family, values| {
         let x0 = state(&state0, family.idle())?;
         if family.build(values).wall(&x0).is_some_and(|value: f64| value <= 0.0) {
@@ -246,6 +257,7 @@ fn simulate<'py>(
     dict.set_item("event_t", table(flat.event_t))?;
     dict.set_item("event_state", table(flat.event_x).reshape([events, flat.dimension])?)?;
     dict.set_item("outcome", flat.outcome)?;
+    dict.set_item("method", flat.method)?;
     dict.set_item("counts", flat.counts)?;
     dict.set_item("dense", flat.record.map(Dense))?;
     Ok(dict)

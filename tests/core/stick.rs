@@ -26,7 +26,7 @@ fn run<M: System<f64, D>, const D: usize>(system: &M, end: f64, x0: [f64; D]) ->
     trajectory(
         system,
         Dopri5::default(),
-        Output::Steps(0.0, end),
+        Output::Steps(0.0, end, 1),
         x0,
         &TIGHT,
         false,
@@ -541,7 +541,7 @@ proptest! {
         let system = PendulumFamily { effects }.build(&values);
         let rtol = 10f64.powf(-digits);
         let tolerance = Tolerance::new(rtol, 1e-3 * rtol);
-        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0), [omega, theta], &tolerance, false, (&CancelFlag::new(), None));
+        let run = trajectory(&system, Dopri5::default(), Output::Steps(0.0, 10.0, 1), [omega, theta], &tolerance, false, (&CancelFlag::new(), None));
         let run = run.unwrap();
         prop_assert_eq!(run.outcome, Outcome::Finished);
         // At 1e-12 ten seconds take up to 3000 steps.

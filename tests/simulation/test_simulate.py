@@ -99,18 +99,46 @@ def test_an_independent_integrator_agrees(model, start, end) -> None:  # type: i
 
 def test_accepted_steps_samples_and_dense_output_agree() -> None:
     model, start = udd.Disk(0.088), [3.0, 0.005, 0.0, 0.0]
-    steps = udd.simulate(model, 2.0, start, dense=True)
+    steps = udd.simulate(model, 2.0, start, method="dopri5", dense=True)
     assert steps.t[0] == 0.0 and steps.t[-1] == 2.0 and (np.diff(steps.t) > 0).all()
     assert len(steps.t) == steps.stats.accepted + 1
     np.testing.assert_allclose(steps(steps.t), steps.state, rtol=1e-14, atol=1e-15)
     t = np.linspace(0, 2, 333)
-    sampled = udd.simulate(model, t, start)
+    sampled = udd.simulate(model, t, start, method="dopri5")
     assert sampled.stats == steps.stats, "sampling must not change the steps"
     np.testing.assert_allclose(steps(t), sampled.state, rtol=1e-14, atol=1e-15)
     assert steps(1.0).shape == (4,) and steps(t.reshape(9, 37)).shape == (9, 37, 4)
     # Between the steps the polynomial is about as accurate as the steps are: 1e-9 of the state.
     exact = udd.simulate(model, t, start, **TIGHT).state
     np.testing.assert_allclose(sampled.state, exact, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("model", "start", "method"),
+    [
+        (udd.DLE(1.0), [1.0, 1.0, 0.01], "taylor"),
+        (udd.Disk(0.039), [0.0, 0.001, 0.04, 0.0], "taylor"),
+        (udd.Model(["x", "v"], ["v", "where(sin(x) > v*x, -x, -2*x)"]), [1.0, 0.0], "taylor"),
+        (udd.Model(["x", "v"], ["v", "-atan2(x, 2 + v)"]), [1.0, 0.0], "dop853"),
+        (udd.Model(["x"], ["-1e5*(x - cos(t))"]), [0.0], "rodas"),
+    ],
+)
+def test_the_default_says_which_method_ran(model: udd.models.Model, start: list[float], method: str) -> None:
+    run = udd.simulate(model, [0.0, 2.0], start)
+    assert run.stats.method == method
+    again = udd.simulate(model, [0.0, 2.0], start, method=method)
+    assert again.stats.method == method
+    np.testing.assert_allclose(run.state[-1], again.state[-1], rtol=1e-7, atol=1e-9)
+
+
+def test_the_long_steps_of_a_series_are_shown_within() -> None:
+    model, start = udd.DLE(1.0), [1.0, 1.0, 0.01]
+    run, ends = udd.simulate(model, 20.0, start), udd.simulate(model, 20.0, start, method="taylor")
+    assert run.stats == ends.stats and len(ends.t) == ends.stats.accepted + 1
+    assert len(run.t) == 8 * run.stats.accepted + 1 and (np.diff(run.t) > 0).all()
+    np.testing.assert_array_equal(run.state[::8], ends.state)
+    exact = udd.simulate(model, run.t, start, **TIGHT).state
+    np.testing.assert_allclose(run.state, exact, rtol=1e-6, atol=1e-6)
 
 
 def test_the_interpolation_error_is_of_order_4() -> None:

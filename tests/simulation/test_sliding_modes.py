@@ -125,7 +125,7 @@ def test_friction_beside_a_spring_that_acts_on_one_side() -> None:
 def test_room_is_for_surfaces_that_can_hold() -> None:
     """Three walls of the coordinate before the friction in the text."""
     text = "-k*x - where(x > 2, 1, 0) - where(x > 3, 1, 0) + where(x < -2, 1, 0) - F*sign(v)"
-    run = udd.simulate(udd.Model(["x", "v"], ["v", text], {"k": 1.0, "F": 0.3}), 20.0, [1.5, 0.0])
+    run = udd.simulate(udd.Model(["x", "v"], ["v", text], {"k": 1.0, "F": 0.3}), 20.0, [1.4, 0.0])
     assert run.outcome == "finished"
     assert run.events.kind[-1] == "stick"
 

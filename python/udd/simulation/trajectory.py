@@ -94,12 +94,15 @@ class Stats(NamedTuple):
         Of the rates.
     grazes : int
         Jumps of the law that the run only just reached: beyond them its derivatives are in doubt.
+    method : str
+        The method that took the steps: ``"dopri5"``, ``"dop853"``, ``"taylor"`` or ``"rodas"``.
     """
 
     accepted: int
     rejected: int
     evaluations: int
     grazes: int
+    method: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +121,7 @@ class Trajectory(Drawable):
         An ejected run ends on the disk's edge, a chattering one where the law switches again and again while
         time stands still; the last time and state are there.
     stats : Stats
-        Accepted and rejected steps, evaluations of the rates.
+        Accepted and rejected steps, evaluations of the rates, and the method that ran.
     model : Model
         What was run.
     dense : callable or None
@@ -275,7 +278,7 @@ def simulate(
     rtol: float = 1e-9,
     atol: float = 1e-12,
     max_step: float | None = None,
-    method: str = "dopri5",
+    method: str = "auto",
     dense: bool = False,
     inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
 ) -> Trajectory:
@@ -287,7 +290,8 @@ def simulate(
         :class:`udd.DLE`, :class:`udd.Disk`, :class:`udd.Pendulum` or a user's own :class:`udd.Model`.
     t : array_like, shape (n,), or float
         Times at which the state is wanted, increasing; the first is the initial time. A number is the
-        end of a run from 0, of which the states after all accepted steps are given.
+        end of a run from 0, of which the states after all accepted steps are given. The steps of a power
+        series are long: ``"auto"`` gives seven states within each of them, too.
     state0 : array_like, shape (dim,)
         The initial state.
     rtol, atol : float
@@ -296,14 +300,15 @@ def simulate(
     max_step : float, optional
         The longest step; by default only the error limits it. Without it a smooth pulse that is shorter than
         a step can be missed.
-    method : {"dopri5", "dop853", "taylor", "rodas", "auto"}
-        ``"dopri5"`` is Dormand & Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is
-        theirs of order 8(5, 3), with dense output of order 7, for tight tolerances. ``"taylor"`` follows the
-        solution's power series to order 10 or 18, by the tolerance; its dense output is as accurate as its
-        steps. ``"rodas"`` is the Rosenbrock method Rodas5P of order 5(4), with dense output of order 4, for
-        stiff laws. All land on the surfaces where the law changes. ``"auto"`` takes the fastest, as measured:
-        the series where there is one, with ``"dop853"`` for a run where it does not serve, as next to a pole,
-        and ``"rodas"`` for one of a model of your own that turns out to be stiff.
+    method : {"auto", "dopri5", "dop853", "taylor", "rodas"}
+        ``"auto"`` takes the fastest, as measured: the power series where the law has one, with ``"dop853"``
+        for a run where it does not serve, as next to a pole, and ``"rodas"`` for one of a model of your own
+        that turns out to be stiff. ``run.stats.method`` says which one ran. ``"dopri5"`` is Dormand &
+        Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is theirs of order 8(5, 3),
+        with dense output of order 7, for tight tolerances. ``"taylor"`` follows the solution's power series
+        to order 10 or 18, by the tolerance; its dense output is as accurate as its steps. ``"rodas"`` is the
+        Rosenbrock method Rodas5P of order 5(4), with dense output of order 4, for stiff laws. All land on the
+        surfaces where the law changes.
     dense : bool
         Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
     inputs : mapping of str to InputSignal or array_like, optional
@@ -390,5 +395,5 @@ def integrated(
     else:
         found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, longest, stepper, dense)
     events = Events(tuple(found["event_kind"]), found["event_t"], found["event_state"])
-    stats = Stats(*found["counts"])
+    stats = Stats(*found["counts"], found["method"])
     return Trajectory(found["t"], found["state"], events, found["outcome"], stats, model, found["dense"])
