@@ -5,8 +5,9 @@ use crate::analysis::batch::lanes::{LaneBatch, Start};
 use crate::analysis::batch::method_factory::{Dop853Factory, Dopri5Factory, MethodFactory, TaylorFactory};
 use crate::analysis::batch::rows;
 use crate::analysis::batch::scheduler::{
-    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch,
+    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch, run_one_by_one,
 };
+use crate::analysis::batch::series_family::{SeriesFamily, rates_of};
 use crate::analysis::trajectory::{Outcome, follow};
 use crate::integrate::{Failure, Integrator, Steps, Tolerance, order};
 use crate::model::{AnySystem, Family, System};
@@ -54,34 +55,67 @@ pub struct EnsembleRun<const D: usize> {
 impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     /// Runs them all. `None` stands for runs that were not finished when the work was stopped.
     pub fn run(&self, context: ExecutionContext<'_>) -> Vec<Option<EnsembleRun<D>>> {
-        self.run_beside(self.family, context)
+        // The steps are those of a run by itself, in which idle states do not count.
+        let tolerance = self.tolerance.filled::<D>(self.family.idle());
+        Ensemble { tolerance, ..*self }.run_filled(order(&self.tolerance), context)
     }
 
-    /// The same, where `alone` is the same family, with the same parameters, in the type that single runs are compiled
-    /// for anyway: those that go in no packet are runs of that.
-    pub fn run_beside<A: Family<D>>(
-        &self,
-        alone: &A,
-        context: ExecutionContext<'_>,
-    ) -> Vec<Option<EnsembleRun<D>>> {
+    fn run_filled(&self, order: usize, context: ExecutionContext<'_>) -> Vec<Option<EnsembleRun<D>>> {
         let (runs, isa) = (rows::count(self.values, self.starts), context.isa);
-        let stages = Sampled { ensemble: self, alone, recipe: Dop853Factory, isa };
+        let stages = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+            self.one_by_one(&Dop853Factory, queue, results);
+        };
         let tape = match self.stepper {
             MethodChoice::Dopri5 => None,
-            MethodChoice::Dop853 => return run_batch(&stages, runs, context),
+            MethodChoice::Dop853 => return run_one_by_one(&stages, runs, context),
             MethodChoice::Taylor | MethodChoice::Auto => rows::tape(self.family, self.values),
         };
-        match &tape {
-            Some(tape) => {
-                let recipe = TaylorFactory { tape, order: order(&self.tolerance), isa };
-                let passages = run_batch(&Sampled { ensemble: self, alone, recipe, isa }, runs, context);
-                let failed = |passage: &EnsembleRun<D>| {
-                    self.stepper == MethodChoice::Auto
-                        && passage.outcome.is_err_and(|failure| tape.hands_over(&failure))
-                };
-                rerun_failed(&stages, passages, failed, context)
+        let Some(tape) = &tape else {
+            let job = Sampled { ensemble: self, recipe: Dopri5Factory, isa };
+            let alone = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+                self.one_by_one(&Dopri5Factory, queue, results);
+            };
+            return run_batch(self.family.goes_in_packets().then_some(&job), &alone, runs, context);
+        };
+        let recipe = TaylorFactory { tape, order, isa };
+        let alone = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+            self.one_by_one(&recipe, queue, results);
+        };
+        let rates = |values: &[f64], t: f64, x: &[f64; D]| rates_of(self.family, values, t, x);
+        let &Ensemble { family, values, starts, times, tolerance, stepper } = self;
+        let family = &SeriesFamily::new(&rates, family.idle());
+        let ensemble = &Ensemble { family, values, starts, times, tolerance, stepper };
+        let job = Sampled { ensemble, recipe, isa };
+        let passages = run_batch(self.family.goes_in_packets().then_some(&job), &alone, runs, context);
+        let failed = |passage: &EnsembleRun<D>| {
+            stepper == MethodChoice::Auto && passage.outcome.is_err_and(|failure| tape.hands_over(&failure))
+        };
+        rerun_failed(&stages, passages, failed, context)
+    }
+
+    /// As a [trajectory](crate::analysis::trajectory), so that both share what is compiled.
+    fn one_by_one<T: MethodFactory<D>>(
+        &self,
+        recipe: &T,
+        queue: &Queue<'_>,
+        results: &mut ResultSink<'_, EnsembleRun<D>>,
+    ) {
+        let Ensemble { times, tolerance, .. } = self;
+        while let Some(job) = queue.take() {
+            let Start { values, t, x, end } = self.start::<f64>(job);
+            let (system, method) = (self.family.build(values), recipe.make(values.to_vec()));
+            let passage = if const { T::FORGETS && !<F::Built<f64> as System<f64, D>>::SMOOTH } {
+                let system: &dyn AnySystem<f64, D> = &system;
+                let mut run = Integrator::by(method, system, t, x, None, tolerance).with_wall();
+                passage(&mut run, times, end, queue.stop())
+            } else {
+                let mut run = Integrator::by(method, system, t, x, None, tolerance).with_wall();
+                passage(&mut run, times, end, queue.stop())
+            };
+            match passage {
+                Some(passage) => results.push(job, passage),
+                None => return,
             }
-            None => run_batch(&Sampled { ensemble: self, alone, recipe: Dopri5Factory, isa }, runs, context),
         }
     }
 
@@ -97,14 +131,13 @@ impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
     }
 }
 
-struct Sampled<'a, F, A, const D: usize, T> {
+struct Sampled<'a, F, const D: usize, T> {
     ensemble: &'a Ensemble<'a, F, D>,
-    alone: &'a A,
     recipe: T,
     isa: Isa,
 }
 
-impl<F: Family<D>, A, const D: usize, T: MethodFactory<D>> Sampled<'_, F, A, D, T> {
+impl<F: Family<D>, const D: usize, T: MethodFactory<D>> Sampled<'_, F, D, T> {
     /// Starts a run in a lane; returns its states so far. Not a closure, which would be a function of its own.
     #[inline(always)]
     fn load<R: Real>(
@@ -121,36 +154,11 @@ impl<F: Family<D>, A, const D: usize, T: MethodFactory<D>> Sampled<'_, F, A, D, 
     }
 }
 
-impl<F: Family<D>, A: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob for Sampled<'_, F, A, D, T> {
+impl<F: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob for Sampled<'_, F, D, T> {
     type Yield = EnsembleRun<D>;
 
-    const PACKETS: bool = F::PACKETS && T::STARTS_IN_PACKETS || F::STARTS_IN_PACKETS && T::PACKETS;
-    const DOUBLE: bool = T::PACKETS;
-
-    /// As a [trajectory](crate::analysis::trajectory), so that both share what is compiled.
-    fn walk(&self, queue: &Queue<'_>, results: &mut ResultSink<'_, EnsembleRun<D>>) {
-        let Ensemble { times, tolerance, .. } = self.ensemble;
-        while let Some(job) = queue.take() {
-            let Start { values, t, x, end } = self.ensemble.start::<f64>(job);
-            let (system, method) = (self.alone.build(values), self.recipe.make(values.to_vec()));
-            let passage = if const { T::FORGETS && !<A::Built<f64> as System<f64, D>>::SMOOTH } {
-                let system: &dyn AnySystem<f64, D> = &system;
-                let mut run = Integrator::by(method, system, t, x, None, tolerance).with_wall();
-                passage(&mut run, times, end, queue.stop())
-            } else {
-                let mut run = Integrator::by(method, system, t, x, None, tolerance).with_wall();
-                passage(&mut run, times, end, queue.stop())
-            };
-            match passage {
-                Some(passage) => results.push(job, passage),
-                None => return,
-            }
-        }
-    }
-
-    fn goes_in_packets(&self) -> bool {
-        self.ensemble.family.goes_in_packets()
-    }
+    const PACKETS: bool = F::PACKETS && T::PACKETS;
+    const DOUBLE: bool = T::SERIES;
 
     #[inline(always)]
     fn run_batch<R: Real>(&self, queue: &Queue<'_>, results: &mut ResultSink<'_, EnsembleRun<D>>) {

@@ -14,7 +14,10 @@ pub use batch::cancel::CancelFlag;
 pub use batch::lanes::{LaneBatch, Start};
 pub use batch::method_factory::{Dop853Factory, Dopri5Factory, MethodFactory, TaylorFactory};
 pub use batch::rows;
-pub use batch::scheduler::{BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch};
+pub use batch::scheduler::{
+    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch, run_one_by_one,
+};
+pub use batch::series_family::SeriesFamily;
 pub use ensemble::{Ensemble, EnsembleRun, MethodChoice};
 pub use jacobian::{Linearisation, higher, linear};
 pub use lyapunov::block_average::{Average, BlockAverages};

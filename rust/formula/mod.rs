@@ -1,18 +1,19 @@
 //! A formula given as text.
 //!
-//! It is parsed by a whitelist of names, operators and functions to a list of operations on a stack,
-//! which can be evaluated over any [`Scalar`]; nothing else in the text means anything.
+//! It is parsed by a whitelist of names, operators and functions to a list of operations, nothing else in the text means
+//! anything. A [`Program`] made of it can be evaluated over any [`Scalar`].
 
 mod kinks;
 mod parse;
+mod program;
 mod spline;
 
 pub use kinks::{Kink, Kinks};
+pub use program::{Place, Program};
 pub use spline::Spline;
 
 use thiserror::Error;
 
-use crate::model::{MAX_SURFACES, Sides};
 use crate::scalar::{Mask, Real, Scalar};
 
 /// The most characters of a formula.
@@ -161,32 +162,10 @@ fn name_in<F: PartialEq>(list: &[(&'static str, F)], function: F) -> &'static st
     list.iter().find(|(_, own)| *own == function).map_or("", |(name, _)| name)
 }
 
-/// Where a formula is evaluated.
-#[derive(Clone, Copy, Debug)]
-pub struct Place<'a, S> {
-    pub t: S,
-    pub x: &'a [S],
-    /// May be empty where the formula [has no rates](Expression::has_rates).
-    pub rates: &'a [S],
-    pub parameters: &'a [S],
-    pub inputs: &'a [S],
-}
-
-/// A formula, ready to be evaluated.
-///
-/// ```
-/// use udd::formula::{Expression, Names, Place};
-/// let states = ["omega", "y", "z"].map(String::from);
-/// let names = Names { states: &states, parameters: &["w".to_owned()], inputs: &[], rates: false };
-/// let energy = Expression::parse("(y^2 + z^2)/2 = w", names).unwrap();
-/// let place = Place { t: 0.0, x: &[1.0, 2.0, 4.0], rates: &[], parameters: &[7.0], inputs: &[] };
-/// assert_eq!(energy.value(&place, &mut energy.stack()), 3.0);
-/// assert!(Expression::parse("q - 1", names).is_err());
-/// ```
+/// A formula as a list of operations; a [`Program`] evaluates it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
     ops: Vec<Op>,
-    depth: usize,
 }
 
 impl Expression {
@@ -204,12 +183,7 @@ impl Expression {
     }
 
     fn of(ops: Vec<Op>) -> Self {
-        let (mut depth, mut height) = (0, 0_usize);
-        for op in &ops {
-            height = height + 1 - op.takes();
-            depth = depth.max(height);
-        }
-        Self { ops, depth }
+        Self { ops }
     }
 
     /// Puts one operation in the place of these wherever they stand, one that pushes as much.
@@ -226,16 +200,6 @@ impl Expression {
     /// The operations.
     pub fn ops(&self) -> &[Op] {
         &self.ops
-    }
-
-    /// How many numbers are on the stack at most.
-    pub fn depth(&self) -> usize {
-        self.depth
-    }
-
-    /// Room for [`value`](Expression::value), which allocates nothing.
-    pub fn stack<S: Scalar>(&self) -> Vec<S> {
-        vec![S::zero(); self.depth]
     }
 
     /// Whether it needs the rates.
@@ -292,71 +256,6 @@ impl Expression {
             degrees.push(degree);
         }
         degrees[0]
-    }
-
-    /// Its value.
-    ///
-    /// # Panics
-    /// Where the stack was made for another formula, or the place lacks what the formula takes.
-    #[inline]
-    pub fn value<S: Scalar>(&self, place: &Place<'_, S>, stack: &mut [S]) -> S {
-        self.value_on(place, &[S::mask(true); MAX_SURFACES], stack)
-    }
-
-    /// The same with its [kinks](Kinks) taken on these sides.
-    // One function for each kind of number: its loop is large.
-    #[inline(never)]
-    pub fn value_on<S: Scalar>(&self, place: &Place<'_, S>, sides: &Sides<S>, stack: &mut [S]) -> S {
-        let leaf = |leaf| match leaf {
-            Leaf::Number(value) => S::constant(value),
-            Leaf::Time => place.t,
-            Leaf::State(n) => place.x[n],
-            Leaf::Rate(n) => place.rates[n],
-            Leaf::Parameter(i) => place.parameters[i],
-            Leaf::Input(k) => place.inputs[k],
-        };
-        self.evaluate(leaf, sides, stack)
-    }
-
-    /// Its value where its leaves have these.
-    ///
-    /// # Panics
-    /// Where the stack is lower than the formula's [depth](Expression::depth).
-    // One function for each kind of number and of leaf.
-    #[inline(never)]
-    pub fn value_of<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, stack: &mut [S]) -> S {
-        self.evaluate(leaf, &[S::mask(true); MAX_SURFACES], stack)
-    }
-
-    #[inline(always)]
-    fn evaluate<S: Scalar>(&self, leaf: impl Fn(Leaf) -> S, sides: &Sides<S>, stack: &mut [S]) -> S {
-        let mut top = 0;
-        for op in &self.ops {
-            match *op {
-                Op::Push(own) => {
-                    stack[top] = leaf(own);
-                    top += 1;
-                }
-                Op::Unary(function) => stack[top - 1] = function.of(stack[top - 1]),
-                Op::Spline(spline) => {
-                    stack[top - 1] = spline.of(stack[top - 1], &|i| leaf(Leaf::Parameter(i)));
-                }
-                Op::Binary(function) => {
-                    top -= 1;
-                    stack[top - 1] = function.of(stack[top - 1], stack[top]);
-                }
-                Op::Where => {
-                    top -= 2;
-                    let above = S::zero().less(stack[top - 1]);
-                    stack[top - 1] = S::jumping(above, stack[top], stack[top + 1]);
-                }
-                Op::On(kink, side) => {
-                    top -= kink.takes() - 1;
-                    stack[top - 1] = kink.on(sides[usize::from(side)], &stack[top - 1..]);
-                }
-            }
-        }
-        stack[0]
     }
 }
 

@@ -37,6 +37,10 @@ impl Family<3> for DleFamily {
 
     const PACKETS: bool = true;
 
+    fn goes_in_packets(&self) -> bool {
+        true
+    }
+
     fn parameters(&self) -> Vec<Parameter> {
         vec![parameter("w", ""), parameter("B", "")]
     }

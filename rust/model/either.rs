@@ -103,7 +103,6 @@ impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
 
     // What one is worth in packets is not worth compiling the other for them.
     const PACKETS: bool = A::PACKETS && B::PACKETS;
-    const STARTS_IN_PACKETS: bool = A::STARTS_IN_PACKETS && B::STARTS_IN_PACKETS;
 
     fn goes_in_packets(&self) -> bool {
         ask!(self, family => family.goes_in_packets())

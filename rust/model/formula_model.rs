@@ -7,18 +7,29 @@ use super::{
     EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System,
     choose, enclosed, parameter,
 };
-use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Place};
+use crate::formula::{Expression, Kinks, Mistake, Names, Place, Program};
 use crate::integrate::{Probes, StepStart, TARGETS, suspect_in_turn};
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
-use crate::unroll::vector;
 
-/// The most intermediate values of an equation; most need few.
-const DEEP: usize = 64;
-const SHALLOW: usize = 8;
 /// A power of two, far from the states that linear functions are asked for.
 const FAR: f64 = 1_048_576.0;
 /// The most measured inputs.
 pub const MAX_INPUTS: usize = 8;
+
+/// The programs of the rates and of the surfaces on which they have kinks.
+#[derive(Debug, PartialEq)]
+struct Law {
+    rates: Program,
+    surfaces: Vec<Program>,
+    kinks: Kinks,
+}
+
+impl Law {
+    fn of(equations: &[Expression], kinks: Kinks) -> Self {
+        let surfaces = kinks.surfaces.iter().map(|own| Program::of([own])).collect();
+        Self { rates: Program::of(equations), surfaces, kinks }
+    }
+}
 
 /// Where the values of a model's inputs come from.
 #[derive(Clone, Debug)]
@@ -34,45 +45,25 @@ enum InputValues<S> {
 /// between [sliding](sliding_mode) and not, and the clock of the inputs.
 #[derive(Clone, Debug)]
 pub struct Own<S, const D: usize> {
-    equations: Arc<[Expression; D]>,
-    kinks: Arc<Kinks>,
+    law: Arc<Law>,
+    /// What the parameters determine of the rates, and of each surface.
+    fixed: Vec<S>,
+    fixed_surfaces: Vec<Vec<S>>,
     sliding: Vec<SlidingSurface<S>>,
-    deep: bool,
-    parameters: Vec<S>,
     inputs: InputValues<S>,
 }
 
 impl<S: Scalar, const D: usize> Own<S, D> {
-    /// Over packets, which have their tape, this is asked seldom: not worth compiling their formulas.
+    /// The results of a program at a place, of which the parameters determine what is `fixed`.
+    // One function for each kind of number: the room for the inputs is long beside a short law.
     #[inline(never)]
-    fn lane_by_lane(&self, t: S, x: &[S; D]) -> [S; D] {
-        let mut rates = [S::Real::zero(); D];
-        for lane in 0..S::Real::LANES {
-            let leaf = |leaf| match leaf {
-                Leaf::Number(value) => value,
-                Leaf::Time => t.real().lane(lane),
-                Leaf::State(n) | Leaf::Rate(n) => x[n].real().lane(lane),
-                Leaf::Parameter(i) => self.parameters[i].real().lane(lane),
-                // Models with inputs do not go in packets.
-                Leaf::Input(_) => f64::NAN,
-            };
-            for n in 0..D {
-                rates[n].set_lane(lane, self.equations[n].value_of(leaf, &mut [0.0; DEEP]));
-            }
-        }
-        vector!(S, D; n => S::lift(rates[n]))
-    }
-
-    #[inline(always)]
     fn evaluate(
         &self,
-        formulas: &[Expression],
-        t: S,
-        x: &[S; D],
+        (program, fixed): (&Program, &[S]),
+        (t, x): (S, &[S; D]),
         sides: &Sides<S>,
-        (values, stack): (&mut [S], &mut [S]),
+        results: &mut [S],
     ) {
-        // Written only where it is needed: it is long beside a short law.
         let mut room;
         let inputs = match &self.inputs {
             InputValues::None => &[],
@@ -85,10 +76,14 @@ impl<S: Scalar, const D: usize> Own<S, D> {
                 &room
             }
         };
-        let place = Place { t, x, rates: &[], parameters: &self.parameters, inputs };
-        for (formula, value) in formulas.iter().zip(values) {
-            *value = formula.value_on(&place, sides, stack);
-        }
+        program.run(&Place { t, x, rates: &[], inputs }, fixed, sides, results);
+    }
+
+    /// The rates on given sides, on none of which the law slides.
+    fn plain_rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
+        let mut rates = [S::zero(); D];
+        self.evaluate((&self.law.rates, &self.fixed), (t, x), sides, &mut rates);
+        rates
     }
 
     /// The same law over intervals.
@@ -102,11 +97,10 @@ impl<S: Scalar, const D: usize> Own<S, D> {
             gradient: all(&own.gradient),
         };
         Own {
-            equations: self.equations.clone(),
-            kinks: self.kinks.clone(),
+            law: self.law.clone(),
+            fixed: all(&self.fixed),
+            fixed_surfaces: self.fixed_surfaces.iter().map(|own| all(own)).collect(),
             sliding: self.sliding.iter().map(sliding).collect(),
-            deep: self.deep,
-            parameters: all(&self.parameters),
             inputs: match &self.inputs {
                 InputValues::None => InputValues::None,
                 InputValues::Measured(inputs) => InputValues::Measured(inputs.map(of)),
@@ -117,49 +111,28 @@ impl<S: Scalar, const D: usize> Own<S, D> {
 
     /// The number of the clock's surface, where there is one.
     fn knots(&self) -> usize {
-        self.kinks.surfaces.len() + self.sliding.len()
+        self.law.surfaces.len() + self.sliding.len()
     }
 
     /// The rates on given sides, on none of which the law slides.
-    fn law(&self, t: S, x: &[S; D]) -> impl Fn(&Sides<S>, &mut [S]) {
-        move |sides, rates| {
-            let own: [S; D] = self.values(&self.equations[..], t, x, sides);
-            rates.copy_from_slice(&own);
-        }
+    fn rates_on(&self, t: S, x: &[S; D]) -> impl Fn(&Sides<S>, &mut [S]) {
+        move |sides, rates| self.evaluate((&self.law.rates, &self.fixed), (t, x), sides, rates)
     }
 
     /// The number, among those that it slides on, of the surface `j` or of that which surface `j` is the mode of.
     fn sliding_on(&self, j: usize) -> Option<usize> {
         self.sliding.iter().position(|own| own.surface == j || own.mode == j)
     }
-
-    /// The values of some of its formulas.
-    // One function for each kind of number, too: the room for them is written at every place where it is inlined.
-    #[inline(never)]
-    fn values<const N: usize>(&self, formulas: &[Expression], t: S, x: &[S; D], sides: &Sides<S>) -> [S; N] {
-        let mut values = [S::zero(); N];
-        if self.deep {
-            self.evaluate(formulas, t, x, sides, (&mut values, &mut [S::zero(); DEEP]));
-        } else {
-            self.evaluate(formulas, t, x, sides, (&mut values, &mut [S::zero(); SHALLOW]));
-        }
-        values
-    }
 }
 
 impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
-    // Laws with kinks are not run in packets, which then need not be compiled to land.
-    const SMOOTH: bool = S::Real::LANES > 1;
-
     #[inline]
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
-        if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
-            self.lane_by_lane(t, x)
-        } else if self.sliding.is_empty() {
-            self.values(&self.equations[..], t, x, sides)
+        if self.sliding.is_empty() {
+            self.plain_rates(t, x, sides)
         } else {
             let mut rates = [S::zero(); D];
-            sliding_mode::rates(&self.sliding, sides, &self.law(t, x), &mut rates);
+            sliding_mode::rates(&self.sliding, sides, &self.rates_on(t, x), &mut rates);
             rates
         }
     }
@@ -170,42 +143,35 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     }
 
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S {
-        // As said above, not called.
-        if const { S::Real::LANES > 1 } {
-            return S::one();
-        }
         if let (InputValues::Measured(inputs), true) = (&self.inputs, j == self.knots()) {
             return inputs.surface(t, sides[j]);
         }
         if let Some(i) = self.sliding_on(j) {
             let own = &self.sliding[i];
             if own.mode == j {
-                return sliding_mode::margin(&self.sliding, i, sides, &self.law(t, x));
+                return sliding_mode::margin(&self.sliding, i, sides, &self.rates_on(t, x));
             } else if own.slides(sides).any() {
                 return -S::one();
             }
         }
-        let [value] = self.values(&self.kinks.surfaces[j..=j], t, x, sides);
-        value
+        let mut value = [S::zero()];
+        self.evaluate((&self.law.surfaces[j], &self.fixed_surfaces[j]), (t, x), sides, &mut value);
+        value[0]
     }
 
     fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool {
-        match self.kinks.steady.get(j) {
+        match self.law.kinks.steady.get(j) {
             Some(&steady) => steady,
             None => !self.sliding_on(j).is_some_and(|i| self.sliding[i].slides(sides).any()),
         }
     }
 
     fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {
-        // Packets have no kinks.
-        if const { S::Real::LANES > 1 } {
-            return None;
-        }
         Some(Box::new(self.enclosed(lane)))
     }
 
     fn surface_name(&self, j: usize, side: bool) -> &'static str {
-        match (self.kinks.jumps.get(j), side) {
+        match (self.law.kinks.jumps.get(j), side) {
             (Some(true), _) => "jump",
             (Some(false), _) => "kink",
             (None, true) => "stick",
@@ -214,26 +180,20 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     }
 
     fn settle(&self, t: S, x: &[S; D], sides: &mut Sides<S>) {
-        if const { S::Real::LANES == 1 } {
-            sliding_mode::settle(&self.sliding, x, sides, &self.law(t, x));
-        }
+        sliding_mode::settle(&self.sliding, x, sides, &self.rates_on(t, x));
     }
 
     fn switch(&self, j: usize, t: S, x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
-        // Packets have no kinks.
-        if const { S::Real::LANES > 1 } {
-            return;
-        }
         if let Some(i) = self.sliding_on(j) {
             let start = *x;
-            sliding_mode::switch(&self.sliding, i, x, sides, here, &self.law(t, &start));
+            sliding_mode::switch(&self.sliding, i, x, sides, here, &self.rates_on(t, &start));
         } else {
             sides[j] = choose(here, sides[j].not(), sides[j]);
         }
     }
 
     fn jumps(&self, j: usize) -> bool {
-        match (self.kinks.jumps.get(j), &self.inputs) {
+        match (self.law.kinks.jumps.get(j), &self.inputs) {
             (Some(&jumps), _) => jumps,
             // What is let go starts with the rates that it had: that switch is continuous.
             (None, InputValues::Measured(inputs)) => j == self.knots() && inputs.jumps(),
@@ -284,8 +244,7 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FormulaFamily<const D: usize> {
     equations: Arc<[Expression; D]>,
-    kinks: Arc<Kinks>,
-    deep: bool,
+    law: Arc<Law>,
     parameters: Vec<String>,
     states: Vec<(String, bool)>,
     inputs: usize,
@@ -319,21 +278,18 @@ impl<const D: usize> FormulaFamily<D> {
             }
             let one = Expression::parse(text, Names { states, parameters, inputs, rates: false });
             let one = one.map_err(|mistake| (n, mistake))?;
-            if one.depth() > DEEP {
-                return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
-            }
             parsed.push(one);
         }
         let mut kinks = Kinks { clocked: !inputs.is_empty(), ..Kinks::default() };
         parsed.iter_mut().for_each(|one| kinks.of(one));
         kinks.find_sliding(&parsed);
-        let deep = parsed.iter().chain(&kinks.surfaces).any(|one| one.depth() > SHALLOW);
         let equations = with_idle(parsed);
+        let law = Arc::new(Law::of(&equations, kinks));
         let states = states.iter().map(|name| (name.clone(), false)).collect();
-        let (equations, kinks) = (Arc::new(equations), Arc::new(kinks));
+        let equations = Arc::new(equations);
         let (parameters, inputs, records) = (parameters.to_vec(), inputs.len(), Arc::default());
         let observation = Observation::default();
-        Ok(Self { equations, kinks, deep, parameters, states, inputs, records, record: 0, observation })
+        Ok(Self { equations, law, parameters, states, inputs, records, record: 0, observation })
     }
 
     /// With what sensors see of it.
@@ -368,10 +324,10 @@ impl<const D: usize> FormulaFamily<D> {
     /// # Panics
     /// Where there are more than `E` states already.
     pub fn filled<const E: usize>(&self) -> FormulaFamily<E> {
+        let equations = with_idle(self.equations[..self.states.len()].to_vec());
         FormulaFamily {
-            equations: Arc::new(with_idle(self.equations[..self.states.len()].to_vec())),
-            kinks: self.kinks.clone(),
-            deep: self.deep,
+            law: Arc::new(Law::of(&equations, self.law.kinks.clone())),
+            equations: Arc::new(equations),
             parameters: self.parameters.clone(),
             states: self.states.clone(),
             inputs: self.inputs,
@@ -387,9 +343,14 @@ impl<const D: usize> FormulaFamily<D> {
     }
 
     fn built<S: Scalar>(&self, values: &[S], inputs: InputValues<S>) -> Own<S, D> {
-        let (equations, kinks) = (self.equations.clone(), self.kinks.clone());
-        let sliding = sliding_surfaces(&kinks, D, values);
-        Own { equations, kinks, sliding, deep: self.deep, parameters: values.to_vec(), inputs }
+        let law = self.law.clone();
+        Own {
+            fixed: law.rates.fix(values),
+            fixed_surfaces: law.surfaces.iter().map(|own| own.fix(values)).collect(),
+            sliding: sliding_surfaces(&law, D, values),
+            law,
+            inputs,
+        }
     }
 
     /// The right-hand sides.
@@ -400,17 +361,13 @@ impl<const D: usize> FormulaFamily<D> {
 
 /// The surfaces that the law of so many states may slide on, as many as there is room for. For any number of states, so
 /// that it is compiled once for each kind of number.
-fn sliding_surfaces<S: Scalar>(kinks: &Kinks, states: usize, values: &[S]) -> Vec<SlidingSurface<S>> {
+fn sliding_surfaces<S: Scalar>(law: &Law, states: usize, values: &[S]) -> Vec<SlidingSurface<S>> {
+    let kinks = &law.kinks;
     let mut surfaces = Vec::new();
-    // Packets have no kinks.
-    if const { S::Real::LANES > 1 } {
-        return surfaces;
-    }
     let room = MAX_SURFACES - kinks.surfaces.len() - usize::from(kinks.clocked);
     for &surface in kinks.sliding.iter().take(room.min(sliding_mode::MAX_SLIDING)) {
         let at = |x: &[S]| {
-            let place = Place { t: S::zero(), x, rates: &[], parameters: values, inputs: &[] };
-            kinks.surfaces[surface].value(&place, &mut [S::zero(); DEEP])
+            law.surfaces[surface].value(&Place { t: S::zero(), x, rates: &[], inputs: &[] }, values)
         };
         let mut x = vec![S::zero(); states];
         let offset = at(&x);
@@ -440,11 +397,8 @@ fn with_idle<const D: usize>(mut equations: Vec<Expression>) -> [Expression; D] 
 impl<const D: usize> Family<D> for FormulaFamily<D> {
     type Built<S: Scalar> = Own<S, D>;
 
-    // The usual numbers of states: every one takes its time to compile.
-    const STARTS_IN_PACKETS: bool = matches!(D, 2..=4);
-
     fn goes_in_packets(&self) -> bool {
-        self.kinks.surfaces.is_empty() && self.inputs == 0
+        self.law.surfaces.is_empty() && self.inputs == 0
     }
 
     fn idle(&self) -> usize {

@@ -270,15 +270,13 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The system it builds.
     type Built<S: Scalar>: System<S, D>;
 
-    /// Whether many runs are taken in packets: it makes a short law several times as fast, at the cost of
-    /// compiling every analysis of it for each instruction set. Others run one by one, with the same bits.
+    /// Whether its rates are compiled for packets, which methods without series need: worth it for a short law only.
     const PACKETS: bool = false;
-    /// The same for ensembles by the Taylor method alone, where many runs are most wanted.
-    const STARTS_IN_PACKETS: bool = Self::PACKETS;
 
-    /// Whether this one is run in packets where its kind is.
+    /// Returns true if many runs can go in packets, one in each lane: the law is smooth and has no wall. Others run one by
+    /// one, with the same bits.
     fn goes_in_packets(&self) -> bool {
-        true
+        false
     }
 
     /// How many states at the end only fill up the number that the analysis is compiled for: they rest, and nothing

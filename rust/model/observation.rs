@@ -3,16 +3,12 @@
 use std::sync::Arc;
 
 use super::MAX_SURFACES;
-use crate::formula::{Expression, Mistake, Names, Place};
+use crate::formula::{Expression, Mistake, Names, Place, Program};
 use crate::scalar::Scalar;
 
-/// The most intermediate values of a formula.
-const DEEP: usize = 64;
-
-/// A sensor's channel: what it sees, the parameter by how much it is late, and whether it is an angle.
+/// A sensor's channel: the parameter by how much it is late, and whether it is an angle.
 #[derive(Clone, Debug, PartialEq)]
 struct Channel {
-    formula: Expression,
     delay: Option<usize>,
     angle: bool,
 }
@@ -30,6 +26,8 @@ struct Channel {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     channels: Arc<[Channel]>,
+    /// What the channels see.
+    seen: Arc<Program>,
 }
 
 impl Observation {
@@ -39,19 +37,16 @@ impl Observation {
     /// # Errors
     /// The number of the channel and what is wrong with its formula, in words that continue "the formula ...".
     pub fn parse(texts: &[(&str, Option<usize>, bool)], names: Names<'_>) -> Result<Self, (usize, Mistake)> {
-        let mut channels = Vec::with_capacity(texts.len());
+        let (mut channels, mut formulas) = (Vec::with_capacity(texts.len()), Vec::with_capacity(texts.len()));
         for (n, &(text, delay, angle)) in texts.iter().enumerate() {
             let wrong = |what: String| Err((n, Mistake(what)));
             if text.replace("<=", "").replace(">=", "").contains('=') {
                 return wrong("has =, but only what is seen is wanted".to_owned());
             }
-            let formula = Expression::parse(text, names).map_err(|mistake| (n, mistake))?;
-            if formula.depth() > DEEP {
-                return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
-            }
-            channels.push(Channel { formula, delay, angle });
+            formulas.push(Expression::parse(text, names).map_err(|mistake| (n, mistake))?);
+            channels.push(Channel { delay, angle });
         }
-        Ok(Self { channels: channels.into() })
+        Ok(Self { channels: channels.into(), seen: Arc::new(Program::of(&formulas)) })
     }
 
     /// Whether the state is seen as it is.
@@ -75,11 +70,9 @@ impl Observation {
     /// What the channels see; zero beyond the last one.
     #[inline(never)]
     pub fn values<S: Scalar, const M: usize>(&self, t: S, x: &[S], rates: &[S], parameters: &[S]) -> [S; M] {
-        let place = Place { t, x, rates, parameters, inputs: &[] };
-        let (mut all, mut stack) = ([S::zero(); M], [S::zero(); DEEP]);
-        for (value, channel) in all.iter_mut().zip(&self.channels[..]) {
-            *value = channel.formula.value_on(&place, &[S::mask(true); MAX_SURFACES], &mut stack);
-        }
+        let mut all = [S::zero(); M];
+        let place = Place { t, x, rates, inputs: &[] };
+        self.seen.run_with(&place, parameters, &[S::mask(true); MAX_SURFACES], &mut all);
         all
     }
 }

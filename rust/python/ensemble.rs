@@ -44,13 +44,12 @@ impl Table {
     }
 }
 
-fn collect<F: Family<D>, A: Family<D>, const D: usize>(
+fn collect<F: Family<D>, const D: usize>(
     ensemble: &Ensemble<'_, F, D>,
-    alone: &A,
     mut table: Table,
     context: ExecutionContext<'_>,
 ) -> Table {
-    for passage in ensemble.run_beside(alone, context) {
+    for passage in ensemble.run(context) {
         match passage {
             Some(EnsembleRun { states, t, x, outcome }) => {
                 table.push(states.as_flattened(), t, &x, outcome_code(outcome));
@@ -77,14 +76,14 @@ fn ensemble<'py>(
     }
     let values = batch.rows(&model)?;
     let watched = batch.jobs();
-    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, alone, _values| {
+    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, _values| {
         let starts = jobs::starts(&batch.starts, family.idle())?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();
         let table = Table::new(rows::count(&values, &starts), times.len(), dimension)?;
         let ensemble =
             Ensemble { family, values: &values, starts: &starts, times: &times, tolerance, stepper };
-        let (table, signal) = watched.watch(py, |context| collect(&ensemble, alone, table, context))?;
+        let (table, signal) = watched.watch(py, |context| collect(&ensemble, table, context))?;
         (table, dimension, signal)
     });
     jobs::lost(py, signal, &table.outcome)?;

@@ -60,8 +60,8 @@ pub(crate) use with_model;
 /// The same for work on packets and tangents, which takes long to compile: not for friction by bristles, and of
 /// [filled](AnyModel::filled) models.
 ///
-/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
-/// own. Of `starts`, own models have theirs, too; `alone` is the type that single runs are compiled for.
+/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets`, and of `starts`,
+/// the DLE has its own single runs; `starts` are for up to 12 states.
 macro_rules! with_wide_model {
     (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
         $crate::python::model::with_wide_model!(@ $model, $values, $body,
@@ -72,36 +72,10 @@ macro_rules! with_wide_model {
             Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
             Four($family) Six($family))
     };
-    (starts: $model:expr, |$family:ident, $alone:ident, $values:ident| $body:expr) => {
-        match $model {
-            $crate::python::model::AnyModel::Three($crate::model::Either::First($family), $values) => {
-                let $alone = $family;
-                $body
-            }
-            $crate::python::model::AnyModel::Three($crate::model::Either::Second($family), $values) => {
-                let $alone = $family;
-                $body
-            }
-            $crate::python::model::AnyModel::Two($alone @ $crate::model::Either::Second($family), $values) => $body,
-            $crate::python::model::AnyModel::Two($family, $values) => {
-                let $alone = $family;
-                $body
-            }
-            $crate::python::model::AnyModel::Four($alone @ $crate::model::Either::Second($family), $values) => $body,
-            $crate::python::model::AnyModel::Four($family, $values) => {
-                let $alone = $family;
-                $body
-            }
-            $crate::python::model::AnyModel::Six($family, $values) => {
-                let $alone = $family;
-                $body
-            }
-            $crate::python::model::AnyModel::Twelve($family, $values) => {
-                let $alone = $family;
-                $body
-            }
-            other => return Err(other.too_much()),
-        }
+    (starts: $model:expr, |$family:ident, $values:ident| $body:expr) => {
+        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family)
+            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
+            Four($family) Six($family) Twelve($family))
     };
     (@ $model:expr, $values:ident, $body:expr, $($Kind:ident($held:pat))+) => {
         match $model {

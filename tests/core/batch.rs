@@ -51,8 +51,12 @@ impl BatchJob for Lanes {
 /// Where jobs are few none of the threads fills a packet with them while others go without.
 #[test]
 fn threads_share_few_jobs() {
+    let one_by_one =
+        |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| Lanes.run_batch::<f64>(queue, results);
     for (jobs, most) in [(3, [3, 3, 3]), (20, [20, 10, 7])] {
-        for (context, lanes) in on_each(|context| (context.threads, run_batch(&Lanes, jobs, context))) {
+        for (context, lanes) in
+            on_each(|context| (context.threads, run_batch(Some(&Lanes), &one_by_one, jobs, context)))
+        {
             let (threads, lanes) = lanes;
             assert!(lanes.iter().flatten().all(|&lanes| lanes <= most[threads - 1]), "{context}: {lanes:?}");
         }

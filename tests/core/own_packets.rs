@@ -1,8 +1,12 @@
-//! Ensembles of models given as text: in packets they have the bits of runs one by one.
+//! Models given as text: in packets they have the bits of runs one by one.
 
 use std::sync::atomic::AtomicUsize;
 
-use udd::analysis::{CancelFlag, Ensemble, EnsembleRun, ExecutionContext, MethodChoice};
+use udd::analysis::{
+    CancelFlag, Ensemble, EnsembleRun, ExecutionContext, Lyapunov, LyapunovOptions, MethodChoice, Section,
+    SectionRun,
+};
+use udd::formula::{Expression, Names};
 use udd::integrate::Tolerance;
 use udd::model::FormulaFamily;
 use udd::scalar::Isa;
@@ -17,9 +21,23 @@ fn model<const D: usize>(states: [&str; D], equations: [&str; D]) -> FormulaFami
 
 /// Spread over a cube of side 4 around `centre`.
 fn starts<const D: usize>(n: usize, centre: [f64; D]) -> Vec<[f64; D]> {
-    let by = [0.618, 0.414, 0.732, 0.236];
+    let by = [0.618, 0.414, 0.732, 0.236, 0.303, 0.141, 0.718, 0.577, 0.261, 0.891, 0.685, 0.526];
     let part = |i: usize, d: usize| centre[d] + 4.0 * (i as f64 * by[d]).fract() - 2.0;
     (0..n).map(|i| std::array::from_fn(|d| part(i, d))).collect()
+}
+
+/// A chain of so many Duffing oscillators, idle states behind it up to `D`.
+fn chain<const D: usize>(oscillators: usize) -> FormulaFamily<D> {
+    let name = |letter: &str| (0..oscillators).map(|i| format!("{letter}{i}")).collect::<Vec<_>>();
+    let (x, v) = (name("x"), name("v"));
+    let mut equations = v.clone();
+    for i in 0..oscillators {
+        let pulls =
+            (0..oscillators).filter(|j| i.abs_diff(*j) == 1).map(|j| format!("+c*({}-{})", x[j], x[i]));
+        equations.push(format!("-k*{}-{}^3{}", x[i], x[i], pulls.collect::<String>()));
+    }
+    let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
+    FormulaFamily::parse(&[x, v].concat(), &texts, &["k", "c"].map(str::to_owned), &[]).unwrap()
 }
 
 /// How many runs fail, after comparing all of them with runs one by one.
@@ -77,6 +95,16 @@ fn smooth_laws() {
     }
 }
 
+/// More states than the usual, some of them idle.
+#[test]
+fn chains_of_oscillators() {
+    for rtol in [1e-6, 1e-9] {
+        assert_eq!(failures(&chain::<6>(3), [0.0; 6], &TIMES, rtol), 0);
+        assert_eq!(failures(&chain::<12>(6), [0.0; 12], &TIMES, rtol), 0);
+        assert_eq!(failures(&chain::<12>(4), [0.0; 12], &TIMES, rtol), 0);
+    }
+}
+
 /// Every elementary function and every way to divide, and laws that level off.
 #[test]
 fn elementary_functions() {
@@ -103,6 +131,48 @@ fn a_run_that_fails_leaves_the_others_alone() {
             failures(&root, [3.5, 0.0, 0.0], &TIMES, rtol),
         ] {
             assert!(0 < failed && failed < 21, "{failed} of 21 failed");
+        }
+    }
+}
+
+/// Exponents and crossings of a surface that depends on the rates, in packets and one by one.
+#[test]
+fn exponents_and_sections() {
+    let family = model(["x", "y", "z"], ["10*(y-x)", "x*(28-z)-y", "x*y-8/3*z"]);
+    let (starts, values, stop) = (starts(11, [1.0, 1.0, 20.0]), [VALUES.to_vec()], CancelFlag::new());
+    let tolerance = Tolerance::new(1e-8, 1e-10);
+    let names = ["x", "y", "z"].map(str::to_owned);
+    let names = Names { states: &names, parameters: &[], inputs: &[], rates: true };
+    let function = Expression::parse("z' - y/3", names).unwrap();
+    let sections = [Section { function, rising: true, falling: false }];
+    let run = |starts: &[[f64; 3]], isa| -> Vec<Vec<u64>> {
+        let done = AtomicUsize::new(0);
+        let context = ExecutionContext { threads: 1, isa, done: &done, stop: &stop };
+        let options = LyapunovOptions { time: 12.0, transient: 1.0, goal: 0.0, tolerance };
+        let orbits = Lyapunov { family: &family, values: &values, starts, options };
+        let exponents = orbits.run::<1>(context).into_iter().flatten();
+        let exponents = exponents.map(|orbit| [orbit.exponents.value[0], orbit.x[0], orbit.x[2]].to_vec());
+        let all = SectionRun {
+            family: &family,
+            values: &values,
+            starts,
+            sections: &sections,
+            skip: 1,
+            count: 5,
+            end: 20.0,
+            bounded: [true; 3],
+            tolerance,
+        };
+        let points = all.run(context).into_iter().flatten().map(|found| found.x.into_flattened());
+        let bits = |row: Vec<f64>| row.into_iter().map(f64::to_bits).collect();
+        exponents.chain(points).map(bits).collect()
+    };
+    let alone: Vec<_> = starts.iter().map(|&x| run(&[x], Isa::Baseline)).collect();
+    assert!(alone.iter().all(|rows| rows.len() == 2 && rows[1].len() == 15));
+    for isa in Isa::available() {
+        let together = run(&starts, isa);
+        for (i, rows) in alone.iter().enumerate() {
+            assert_eq!([&together[i], &together[i + 11]], [&rows[0], &rows[1]], "{isa:?}, run {i}");
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::counting::allocations;
 use udd::analysis::{
     CancelFlag, CrossingOutcome, Crossings, ExecutionContext, Output, Section, SectionRun, trajectory,
 };
-use udd::formula::{Expression, Names, Place};
+use udd::formula::{Expression, Names, Place, Program};
 use udd::integrate::{Dopri5, Integrator, Taylor, Tolerance};
 use udd::model::{DiskFamily, DleFamily, Family};
 use udd::scalar::Isa;
@@ -303,14 +303,8 @@ fn value(text: &str) -> f64 {
     let (states, parameters) = (names(&["omega", "y", "z"]), names(&["w", "tilt.angle"]));
     let names = Names { states: &states, parameters: &parameters, inputs: &[], rates: true };
     let parsed = Expression::parse(text, names).unwrap_or_else(|mistake| panic!("{text} {mistake}"));
-    let place = Place {
-        t: 0.25,
-        x: &[2.0, -3.0, 0.5],
-        rates: &[7.0, 11.0, 13.0],
-        parameters: &[5.0, 0.1],
-        inputs: &[],
-    };
-    parsed.value(&place, &mut parsed.stack())
+    let place = Place { t: 0.25, x: &[2.0, -3.0, 0.5], rates: &[7.0, 11.0, 13.0], inputs: &[] };
+    Program::of([&parsed]).value(&place, &[5.0, 0.1])
 }
 
 fn mistake(text: &str) -> String {

@@ -8,10 +8,10 @@ use crate::tape::Tape;
 pub trait MethodFactory<const D: usize>: Sync {
     type Method<S: Scalar>: Method<S, D>;
 
-    /// Whether analyses run it in packets: those that fall back to it need not.
-    const PACKETS: bool;
-    /// The same for ensembles of families that are taken in packets.
-    const STARTS_IN_PACKETS: bool;
+    /// Whether it needs no rates in packets, but the tape alone.
+    const SERIES: bool = false;
+    /// Whether ensembles of families whose rates are compiled for packets run by it in packets.
+    const PACKETS: bool = false;
 
     /// Whether steps are so long, and so is what is compiled for them, that single runs forget the type of the model,
     /// unless its law is short.
@@ -28,8 +28,7 @@ pub struct Dopri5Factory;
 impl<const D: usize> MethodFactory<D> for Dopri5Factory {
     type Method<S: Scalar> = Dopri5<S, D>;
 
-    const PACKETS: bool = false;
-    const STARTS_IN_PACKETS: bool = true;
+    const PACKETS: bool = true;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dopri5<S, D> {
         Dopri5::default()
@@ -43,9 +42,8 @@ pub struct Dop853Factory;
 impl<const D: usize> MethodFactory<D> for Dop853Factory {
     type Method<S: Scalar> = Dop853<S, D>;
 
-    const PACKETS: bool = false;
     // Who wants many runs fast takes another: its twelve stages in packets are not worth their compilation.
-    const STARTS_IN_PACKETS: bool = false;
+    const PACKETS: bool = false;
     const FORGETS: bool = true;
 
     fn make<S: Scalar>(&self, _values: Vec<S>) -> Dop853<S, D> {
@@ -65,8 +63,8 @@ pub struct TaylorFactory<'a, const D: usize> {
 impl<'a, const D: usize> MethodFactory<D> for TaylorFactory<'a, D> {
     type Method<S: Scalar> = Taylor<'a, S, D>;
 
+    const SERIES: bool = true;
     const PACKETS: bool = true;
-    const STARTS_IN_PACKETS: bool = true;
 
     fn make<S: Scalar>(&self, values: Vec<S>) -> Taylor<'a, S, D> {
         Taylor::new(self.tape, values, self.order, self.isa)

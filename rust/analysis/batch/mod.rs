@@ -6,4 +6,5 @@ pub(crate) mod method_factory;
 pub mod parallel;
 pub mod rows;
 pub(crate) mod scheduler;
+pub(crate) mod series_family;
 pub(crate) mod step_budget;

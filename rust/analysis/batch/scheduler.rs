@@ -72,7 +72,10 @@ impl<Y> ResultSink<'_, Y> {
     }
 }
 
-/// What is to be done with every job of a queue.
+/// Takes jobs one by one until none is left.
+pub type OneByOne<'a, Y> = dyn Fn(&Queue<'_>, &mut ResultSink<'_, Y>) + Sync + 'a;
+
+/// What packets do with the jobs of a queue.
 pub trait BatchJob: Sync {
     /// What a job yields.
     type Yield: Send;
@@ -83,16 +86,6 @@ pub trait BatchJob: Sync {
     const DERIVATIVES: usize = 0;
     /// Whether packets of two registers of AVX-512 are worth their time to compile.
     const DOUBLE: bool = false;
-
-    /// Takes jobs one by one until none is left.
-    fn walk(&self, queue: &Queue<'_>, results: &mut ResultSink<'_, Self::Yield>) {
-        self.run_batch::<f64>(queue, results);
-    }
-
-    /// Whether this one can go in packets.
-    fn goes_in_packets(&self) -> bool {
-        true
-    }
 
     /// Takes jobs into the lanes of packets until none is left; a lane that finishes one takes the next.
     ///
@@ -111,26 +104,44 @@ pub struct ExecutionContext<'a> {
     pub stop: &'a CancelFlag,
 }
 
-/// What the jobs yield, in their order; `None` for those that were not finished when the work was
-/// stopped.
-pub fn run_batch<T: BatchJob>(work: &T, jobs: usize, context: ExecutionContext<'_>) -> Vec<Option<T::Yield>> {
-    let mut all = Vec::new();
-    all.resize_with(jobs, || None);
-    spread(all, None, context, &|queue, results| {
-        if T::PACKETS && work.goes_in_packets() && jobs > 1 && context.isa != Isa::Baseline {
-            return context.isa.run(InPackets { work, queue, results });
+/// What the jobs yield, in their order; `None` for those that were not finished when the work was stopped. They go in
+/// `packets` where there are some, else one by one.
+pub fn run_batch<T: BatchJob>(
+    packets: Option<&T>,
+    one_by_one: &OneByOne<'_, T::Yield>,
+    jobs: usize,
+    context: ExecutionContext<'_>,
+) -> Vec<Option<T::Yield>> {
+    spread(unfinished(jobs), None, context, &|queue, results| match packets {
+        Some(work) if T::PACKETS && jobs > 1 && context.isa != Isa::Baseline => {
+            context.isa.run(InPackets { work, queue, results });
         }
-        work.walk(queue, results);
+        _ => one_by_one(queue, results),
     })
 }
 
-/// The same results, once the jobs whose result `failed` have been done again, one by one, by other work.
-pub fn rerun_failed<T: BatchJob>(
-    work: &T,
-    results: Vec<Option<T::Yield>>,
-    failed: impl Fn(&T::Yield) -> bool,
+/// The same where no jobs go in packets.
+pub fn run_one_by_one<Y: Send>(
+    one_by_one: &OneByOne<'_, Y>,
+    jobs: usize,
     context: ExecutionContext<'_>,
-) -> Vec<Option<T::Yield>> {
+) -> Vec<Option<Y>> {
+    spread(unfinished(jobs), None, context, one_by_one)
+}
+
+fn unfinished<Y>(jobs: usize) -> Vec<Option<Y>> {
+    let mut all = Vec::new();
+    all.resize_with(jobs, || None);
+    all
+}
+
+/// The same results, once the jobs whose result `failed` have been done again by other work.
+pub fn rerun_failed<Y: Send>(
+    one_by_one: &OneByOne<'_, Y>,
+    results: Vec<Option<Y>>,
+    failed: impl Fn(&Y) -> bool,
+    context: ExecutionContext<'_>,
+) -> Vec<Option<Y>> {
     let mut again = Vec::new();
     for (job, yielded) in results.iter().enumerate() {
         if yielded.as_ref().is_some_and(&failed) {
@@ -142,7 +153,7 @@ pub fn rerun_failed<T: BatchJob>(
     }
     // They were counted as done already.
     let context = ExecutionContext { done: &AtomicUsize::new(0), ..context };
-    spread(results, Some(&again), context, &|queue, results| work.walk(queue, results))
+    spread(results, Some(&again), context, one_by_one)
 }
 
 /// The whole of the work, compiled for each instruction set.
@@ -176,7 +187,7 @@ fn spread<Y: Send>(
     all: Vec<Option<Y>>,
     only: Option<&[usize]>,
     context: ExecutionContext<'_>,
-    work: &(dyn Fn(&Queue<'_>, &mut ResultSink<'_, Y>) + Sync),
+    work: &OneByOne<'_, Y>,
 ) -> Vec<Option<Y>> {
     let jobs = only.map_or(all.len(), <[usize]>::len);
     let threads = threads(jobs, context.threads);

@@ -4,8 +4,9 @@ use crate::analysis::batch::lanes::{LaneBatch, Start};
 use crate::analysis::batch::method_factory::{Dopri5Factory, MethodFactory, TaylorFactory};
 use crate::analysis::batch::rows;
 use crate::analysis::batch::scheduler::{
-    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch,
+    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch, run_one_by_one,
 };
+use crate::analysis::batch::series_family::{SeriesFamily, rates_of};
 use crate::analysis::lyapunov::block_average::{Average, BlockAverages};
 use crate::analysis::lyapunov::moments::Moments;
 use crate::analysis::lyapunov::tangent_frame::{LogGrowth, tangents};
@@ -65,17 +66,24 @@ impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
     /// first half is dropped.
     pub fn run<const N: usize>(&self, context: ExecutionContext<'_>) -> Vec<Option<Exponents<D, N>>> {
         let (orbits, isa) = (rows::count(self.values, self.starts), context.isa);
-        let stages = Tangents::<_, D, N, _> { orbits: self, recipe: Dopri5Factory, isa };
-        match &rows::tape(self.family, self.values) {
-            Some(tape) => {
-                let recipe = TaylorFactory { tape, order: order(&self.options.tolerance), isa };
-                let found = run_batch(&Tangents::<_, D, N, _> { orbits: self, recipe, isa }, orbits, context);
-                let failed =
-                    |orbit: &Exponents<D, N>| orbit.outcome.is_err_and(|failure| tape.hands_over(&failure));
-                rerun_failed(&stages, found, failed, context)
-            }
-            None => run_batch(&stages, orbits, context),
-        }
+        let stages = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+            let job = Tangents::<_, D, N, _> { orbits: self, recipe: Dopri5Factory, isa };
+            job.run_batch::<f64>(queue, results);
+        };
+        let Some(tape) = &rows::tape(self.family, self.values) else {
+            return run_one_by_one(&stages, orbits, context);
+        };
+        let recipe = TaylorFactory { tape, order: order(&self.options.tolerance), isa };
+        let alone = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+            Tangents::<_, D, N, _> { orbits: self, recipe, isa }.run_batch::<f64>(queue, results);
+        };
+        let rates = |values: &[f64], t: f64, x: &[f64; D]| rates_of(self.family, values, t, x);
+        let &Lyapunov { family, values, starts, options } = self;
+        let family = &SeriesFamily::new(&rates, family.idle());
+        let job = Tangents { orbits: &Lyapunov { family, values, starts, options }, recipe, isa };
+        let found = run_batch(self.family.goes_in_packets().then_some(&job), &alone, orbits, context);
+        let failed = |orbit: &Exponents<D, N>| orbit.outcome.is_err_and(|failure| tape.hands_over(&failure));
+        rerun_failed(&stages, found, failed, context)
     }
 
     fn start<R: Real, const N: usize>(&self, orbit: usize) -> Start<'_, Dual<R, N>, D> {
@@ -100,9 +108,10 @@ impl<F: Family<D>, const D: usize, const N: usize, T: MethodFactory<D>> BatchJob
 {
     type Yield = Exponents<D, N>;
 
-    const PACKETS: bool = F::PACKETS && T::PACKETS;
+    // Tangents of many states fill the registers by themselves.
+    const PACKETS: bool = F::PACKETS && T::SERIES && (N == 1 || D == 3);
     const DERIVATIVES: usize = N;
-    const DOUBLE: bool = N == 1 && T::PACKETS;
+    const DOUBLE: bool = N == 1;
 
     #[inline(always)]
     fn run_batch<R: Real>(&self, queue: &Queue<'_>, results: &mut ResultSink<'_, Exponents<D, N>>) {

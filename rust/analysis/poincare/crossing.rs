@@ -5,12 +5,12 @@ use crate::analysis::poincare::dense_output::{DenseOutput, Room, Scanned};
 use crate::analysis::poincare::hidden::SectionCurve;
 use crate::analysis::poincare::section::Section;
 use crate::analysis::poincare::sign_changes::{Side, Stretch, in_doubt, judge, leave_out};
-use crate::formula::{Binary, Expression, Leaf, Op, Place};
+use crate::formula::{Binary, Expression, Leaf, Op, Place, Program};
 use crate::integrate::root::bracketed;
 use crate::integrate::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes};
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
-use crate::scalar::{Enclosed, Isa, Mask, Real};
+use crate::scalar::{Isa, Mask, Real};
 use crate::unroll::vector;
 
 /// Looked for to this part of the function's largest value near the crossing, and to this size.
@@ -71,16 +71,15 @@ pub(super) struct Law<'a, M, R: Real> {
 /// can contain.
 #[inline(never)]
 pub(super) fn general<M: System<R, D>, R: Real, const D: usize>(
-    function: &Expression,
-    stack: &mut [R],
+    program: &Program,
     law: &Law<'_, M, R>,
     (t, x): (&R, &[R; D]),
 ) -> R {
-    let rates = match function.has_rates() {
+    let rates = match program.has_rates() {
         true => law.system.rates(*t, x, law.sides),
         false => [R::zero(); D],
     };
-    function.value(&Place { t: *t, x, rates: &rates, parameters: law.parameters, inputs: &[] }, stack)
+    program.value(&Place { t: *t, x, rates: &rates, inputs: &[] }, law.parameters)
 }
 
 /// A step that was taken.
@@ -97,8 +96,7 @@ struct Step<'a, R: Real, const D: usize> {
 struct Surface<'a, R: Real> {
     section: &'a Section,
     form: Form,
-    stack: Vec<R>,
-    enclosed: Vec<Enclosed>,
+    program: Program,
     side: Side<R>,
     /// The function's value at the end of the last step.
     value: R,
@@ -136,8 +134,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         let surface = |section: &'a Section| Surface {
             section,
             form: Form::of(&section.function),
-            stack: section.function.stack(),
-            enclosed: section.function.stack(),
+            program: Program::of([&section.function]),
             side: Side {
                 below: never,
                 above: never,
@@ -275,7 +272,7 @@ impl<R: Real> Surface<'_, R> {
     fn at<M: System<R, D>, const D: usize>(&mut self, law: &Law<'_, M, R>, t: &R, x: &[R; D]) -> R {
         match self.form {
             Form::Component(n, less) => x[n] - R::constant(less),
-            Form::Any { .. } => general(&self.section.function, &mut self.stack, law, (t, x)),
+            Form::Any { .. } => general(&self.program, law, (t, x)),
         }
     }
 
@@ -354,14 +351,8 @@ impl<R: Real> Surface<'_, R> {
                 |n: usize, k: usize| step.polynomials.component(n).get(k).map_or(0.0, |c| c.lane(lane));
             let terms = Polynomials::new(step.polynomials.component(0).len(), size, terms);
             let span = (step.from.lane(lane), size * step.polynomials.unit.lane(lane));
-            let mut curve = SectionCurve::new(
-                &self.section.function,
-                (&mut self.stack, &mut self.enclosed),
-                law,
-                lane,
-                span,
-                terms,
-            );
+            let mut curve =
+                SectionCurve::new((&self.section.function, &self.program), law, lane, span, terms);
             let (below, above) = (before.below.lane(lane), before.above.lane(lane));
             let known = (below || above).then_some((0.0, values[0], below));
             let wanted = count.saturating_add(skip.lane(lane) as usize);

@@ -1,15 +1,14 @@
 //! A section's function along a step, over intervals too.
 
 use super::crossing::{Law, general};
-use crate::formula::{Expression, Leaf, Op};
+use crate::formula::{Expression, Leaf, Op, Place, Program};
 use crate::integrate::zeros::{Curve, Polynomials, Range, time};
 use crate::model::System;
 use crate::scalar::{Dual, Enclosed, Interval, Real, Scalar};
 
 /// A section's function along a lane's step.
 pub(super) struct SectionCurve<'a, M, R: Real, const D: usize> {
-    function: &'a Expression,
-    stack: &'a mut [R],
+    program: &'a Program,
     law: &'a Law<'a, M, R>,
     lane: usize,
     /// When the step begins and how long it is.
@@ -17,13 +16,11 @@ pub(super) struct SectionCurve<'a, M, R: Real, const D: usize> {
     polynomials: Polynomials<D>,
     /// The components that it depends on.
     used: [bool; D],
-    room: &'a mut [Enclosed],
 }
 
 impl<'a, M: System<R, D>, R: Real, const D: usize> SectionCurve<'a, M, R, D> {
     pub fn new(
-        function: &'a Expression,
-        (stack, room): (&'a mut [R], &'a mut [Enclosed]),
+        (function, program): (&Expression, &'a Program),
         law: &'a Law<'a, M, R>,
         lane: usize,
         span: (f64, f64),
@@ -32,7 +29,7 @@ impl<'a, M: System<R, D>, R: Real, const D: usize> SectionCurve<'a, M, R, D> {
         let uses =
             |n| [Leaf::State(n), Leaf::Rate(n)].iter().any(|&own| function.ops().contains(&Op::Push(own)));
         let used = std::array::from_fn(uses);
-        Self { function, stack, law, lane, span, polynomials, used, room }
+        Self { program, law, lane, span, polynomials, used }
     }
 }
 
@@ -40,29 +37,24 @@ impl<M: System<R, D>, R: Real, const D: usize> Curve for SectionCurve<'_, M, R, 
     fn value(&mut self, s: f64) -> f64 {
         let t = R::constant(self.span.0 + s * self.span.1);
         let x = self.polynomials.at(s).map(R::constant);
-        general(self.function, self.stack, self.law, (&t, &x)).lane(self.lane)
+        general(self.program, self.law, (&t, &x)).lane(self.lane)
     }
 
     fn enclose(&mut self, a: f64, b: f64) -> Enclosed {
-        let Self { function, law, lane, span, polynomials, used, room, .. } = self;
+        let Self { program, law, lane, span, polynomials, used } = self;
         let ranges: [Option<Range>; D] = std::array::from_fn(|n| used[n].then(|| polynomials.range(n, a, b)));
         let unknown = Range { value: Interval::UNKNOWN, slope: Interval::UNKNOWN, bend: Interval::UNKNOWN };
         let range = |n: usize| ranges[n].unwrap_or(unknown);
-        let leaf = |leaf: Leaf| match leaf {
-            Leaf::Number(value) => Enclosed::constant(value),
-            Leaf::Time => time(span.0, span.1, a, b),
-            Leaf::State(n) => {
-                let Range { value, slope, .. } = range(n);
-                Dual { re: value, d: [slope] }
-            }
-            // The rate of the polynomial itself.
-            Leaf::Rate(n) => {
-                let Range { slope, bend, .. } = range(n);
-                Dual { re: slope.scale(1.0 / span.1), d: [bend.scale(1.0 / span.1)] }
-            }
-            Leaf::Parameter(i) => Enclosed::constant(law.parameters[i].lane(*lane)),
-            Leaf::Input(_) => Enclosed::constant(f64::NAN),
-        };
-        function.value_of(leaf, room)
+        let x: [Enclosed; D] = std::array::from_fn(|n| {
+            let Range { value, slope, .. } = range(n);
+            Dual { re: value, d: [slope] }
+        });
+        // Those of the polynomial itself.
+        let rates: [Enclosed; D] = std::array::from_fn(|n| {
+            let Range { slope, bend, .. } = range(n);
+            Dual { re: slope.scale(1.0 / span.1), d: [bend.scale(1.0 / span.1)] }
+        });
+        let place = Place { t: time(span.0, span.1, a, b), x: &x, rates: &rates, inputs: &[] };
+        program.value_at(&place, &|i| Enclosed::constant(law.parameters[i].lane(*lane)))
     }
 }

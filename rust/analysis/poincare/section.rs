@@ -4,8 +4,9 @@ use crate::analysis::batch::lanes::{LaneBatch, Start};
 use crate::analysis::batch::method_factory::{Dopri5Factory, MethodFactory, TaylorFactory};
 use crate::analysis::batch::rows;
 use crate::analysis::batch::scheduler::{
-    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch,
+    BatchJob, ExecutionContext, Queue, ResultSink, rerun_failed, run_batch, run_one_by_one,
 };
+use crate::analysis::batch::series_family::{SeriesFamily, rates_of};
 use crate::analysis::poincare::crossing::{Crossing, Scan};
 use crate::formula::Expression;
 use crate::integrate::{Failure, Tolerance, order};
@@ -99,16 +100,24 @@ impl<F: Family<D>, const D: usize> SectionRun<'_, F, D> {
     /// Collects them all. `None` stands for trajectories that were not begun when the work was stopped.
     pub fn run(&self, context: ExecutionContext<'_>) -> Vec<Option<Crossings<D>>> {
         let (jobs, isa) = (rows::count(self.values, self.starts), context.isa);
-        let stages = Collect { sections: self, recipe: Dopri5Factory, isa };
-        match &rows::tape(self.family, self.values) {
-            Some(tape) => {
-                let recipe = TaylorFactory { tape, order: order(&self.tolerance), isa };
-                let found = run_batch(&Collect { sections: self, recipe, isa }, jobs, context);
-                let failed = |crossings: &Crossings<D>| matches!(crossings.ended, CrossingOutcome::Failed(failure) if tape.hands_over(&failure));
-                rerun_failed(&stages, found, failed, context)
-            }
-            None => run_batch(&stages, jobs, context),
-        }
+        let stages = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+            Collect { sections: self, recipe: Dopri5Factory, isa }.run_batch::<f64>(queue, results);
+        };
+        let Some(tape) = &rows::tape(self.family, self.values) else {
+            return run_one_by_one(&stages, jobs, context);
+        };
+        let recipe = TaylorFactory { tape, order: order(&self.tolerance), isa };
+        let alone = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
+            Collect { sections: self, recipe, isa }.run_batch::<f64>(queue, results);
+        };
+        let rates = |values: &[f64], t: f64, x: &[f64; D]| rates_of(self.family, values, t, x);
+        let &SectionRun { family, values, starts, sections, skip, count, end, bounded, tolerance } = self;
+        let family = &SeriesFamily::new(&rates, family.idle());
+        let sections = &SectionRun { family, values, starts, sections, skip, count, end, bounded, tolerance };
+        let job = Collect { sections, recipe, isa };
+        let found = run_batch(self.family.goes_in_packets().then_some(&job), &alone, jobs, context);
+        let failed = |crossings: &Crossings<D>| matches!(crossings.ended, CrossingOutcome::Failed(failure) if tape.hands_over(&failure));
+        rerun_failed(&stages, found, failed, context)
     }
 
     fn start<R: Real>(&self, job: usize) -> Start<'_, R, D> {
@@ -127,8 +136,8 @@ struct Collect<'a, F, const D: usize, T> {
 impl<F: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob for Collect<'_, F, D, T> {
     type Yield = Crossings<D>;
 
-    const PACKETS: bool = F::PACKETS && T::PACKETS;
-    const DOUBLE: bool = T::PACKETS;
+    const PACKETS: bool = F::PACKETS && T::SERIES;
+    const DOUBLE: bool = true;
 
     #[inline(always)]
     fn run_batch<R: Real>(&self, queue: &Queue<'_>, results: &mut ResultSink<'_, Crossings<D>>) {

@@ -1,7 +1,7 @@
 //! An effect that a user writes as text.
 
 use super::{Body, Contributions, EffectInputs, Slot};
-use crate::formula::{Binary, Expression, Leaf, Mistake, Names, Op, Unary, is_reserved};
+use crate::formula::{Binary, Expression, Leaf, Mistake, Names, Op, Place, Program, Unary, is_reserved};
 use crate::scalar::Scalar;
 
 /// What a formula may look at beside the time: the [`EffectInputs`] by its names. The last two are a pendulum's names
@@ -13,10 +13,6 @@ const OMEGA: usize = 0;
 const SPEED: usize = 1;
 const OF_DISK: [usize; 2] = [7, 9];
 const OF_PENDULUM: [usize; 2] = [10, 11];
-
-/// The most intermediate values of a formula; most need few.
-const DEEP: usize = 32;
-const SHALLOW: usize = 6;
 
 /// An effect given as text, with parameters of its own.
 ///
@@ -31,7 +27,7 @@ const SHALLOW: usize = 6;
 pub struct Formula {
     name: String,
     slot: Slot,
-    function: Expression,
+    function: Program,
     parameters: Vec<String>,
     bodies: Vec<Body>,
 }
@@ -73,9 +69,6 @@ impl Formula {
                 return wrong(format!("does not use its parameter {own}"));
             }
         }
-        if function.depth() > DEEP {
-            return wrong(format!("has brackets that leave more than {DEEP} numbers open at once"));
-        }
         let is_amplitude: Vec<bool> = parameters.iter().map(|own| amplitudes.contains(own)).collect();
         if !amplitudes.is_empty() && degree(&function, &is_amplitude) != Degree::One {
             return wrong(format!(
@@ -97,6 +90,7 @@ impl Formula {
                 "mixes what only a disk has (W, R, a moving contact) with theta or length".to_owned(),
             );
         }
+        let function = Program::of([&function]);
         Ok(Self { name: name.to_owned(), slot, function, parameters: parameters.to_vec(), bodies })
     }
 
@@ -130,18 +124,9 @@ impl Formula {
         at: &EffectInputs<A>,
         slots: &mut Contributions<A>,
     ) {
-        let leaf = |leaf| match leaf {
-            Leaf::Number(value) => A::constant(value),
-            Leaf::Time => at.t,
-            Leaf::State(n) | Leaf::Rate(n) => at.quantity(n),
-            Leaf::Parameter(i) => lift(values[i]),
-            Leaf::Input(_) => unreachable!("effects have no inputs"),
-        };
-        let value = if self.function.depth() <= SHALLOW {
-            self.function.value_of(leaf, &mut [A::zero(); SHALLOW])
-        } else {
-            self.function.value_of(leaf, &mut [A::zero(); DEEP])
-        };
+        let x: [A; QUANTITIES.len()] = std::array::from_fn(|n| at.quantity(n));
+        let place = Place { t: at.t, x: &x, rates: &[], inputs: &[] };
+        let value = self.function.value_at(&place, &|i| lift(values[i]));
         match self.slot {
             Slot::Torque => slots.torque += value,
             Slot::Friction => slots.friction += value,

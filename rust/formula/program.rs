@@ -1,0 +1,582 @@
+//! Formulas as one list of operations on registers: a small tape.
+//!
+//! Values that formulas share are evaluated once, and values of parameters alone are evaluated when these are known. Every operation is one of the text: the results are those of the text, to the last bit.
+
+use std::collections::HashMap;
+
+use super::{Binary, Expression, Kink, Leaf, Op, Spline, Unary};
+use crate::model::{MAX_SURFACES, Sides};
+use crate::scalar::Scalar;
+
+/// Where formulas are evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a, S> {
+    pub t: S,
+    pub x: &'a [S],
+    /// May be empty if no formula [has rates](Expression::has_rates).
+    pub rates: &'a [S],
+    pub inputs: &'a [S],
+}
+
+/// What an operation does with the registers `a`, `b` and `c`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Action {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Neg,
+    Square,
+    /// `a b + c`, rounded twice.
+    MulAdd,
+    /// `a b - c`
+    MulSub,
+    /// `c - a b`
+    SubMul,
+    Unary(Unary),
+    Binary(Binary),
+    Where,
+    On(Kink, u8),
+    /// By its number; its coefficients are in the registers from `b` on.
+    Spline(u16),
+}
+
+/// An operation and the register of its result.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step {
+    action: Action,
+    of: [u16; 3],
+    to: u16,
+}
+
+/// Formulas, ready to be evaluated.
+///
+/// ```
+/// use udd::formula::{Expression, Names, Place, Program};
+/// let states = ["omega", "y", "z"].map(String::from);
+/// let names = Names { states: &states, parameters: &["w".to_owned()], inputs: &[], rates: false };
+/// let energy = Expression::parse("(y^2 + z^2)/2 = w", names).unwrap();
+/// let place = Place { t: 0.0, x: &[1.0, 2.0, 4.0], rates: &[], inputs: &[] };
+/// assert_eq!(Program::of([&energy]).value(&place, &[7.0]), 3.0);
+/// assert!(Expression::parse("q - 1", names).is_err());
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Program {
+    /// The first registers hold so many components of the state.
+    states: usize,
+    /// The next ones hold these.
+    leaves: Vec<Leaf>,
+    /// How many of them the parameters determine: they are the last ones.
+    constants: usize,
+    splines: Vec<Spline>,
+    /// What these determine.
+    first: Vec<Step>,
+    /// The registers that the other steps, or the results, take of the constants and of what these determine.
+    fixed: Vec<u16>,
+    steps: Vec<Step>,
+    results: Vec<u16>,
+    registers: usize,
+}
+
+/// Registers of most programs, and of the larger ones; the room of any others is allocated.
+const FEW: usize = 24;
+const MANY: usize = 96;
+
+impl Program {
+    /// For these formulas.
+    pub fn of<'a>(formulas: impl IntoIterator<Item = &'a Expression>) -> Self {
+        let mut graph = Graph::default();
+        let results: Vec<usize> = formulas.into_iter().map(|formula| graph.add(formula)).collect();
+        graph.lower(&results)
+    }
+
+    /// How many results there are.
+    pub fn len(&self) -> usize {
+        self.results.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.results.is_empty()
+    }
+
+    /// Whether they need the rates of the state.
+    pub fn has_rates(&self) -> bool {
+        self.leaves.iter().any(|leaf| matches!(leaf, Leaf::Rate(_)))
+    }
+
+    /// What the parameters determine, for [`run`](Program::run).
+    ///
+    /// # Panics
+    /// If there are fewer parameters than the formulas take.
+    pub fn fix<S: Scalar>(&self, parameters: &[S]) -> Vec<S> {
+        if self.fixed.is_empty() {
+            return Vec::new();
+        }
+        let mut work = vec![S::zero(); self.registers];
+        self.determine(&|i| parameters[i], &mut work);
+        self.fixed.iter().map(|&at| work[usize::from(at)]).collect()
+    }
+
+    /// The results at a place, after [`fix`](Program::fix), with [kinks](super::Kinks) taken on these sides.
+    ///
+    /// # Panics
+    /// If the place lacks what the formulas take, or the results have no room.
+    #[inline(always)]
+    pub fn run<S: Scalar>(&self, place: &Place<'_, S>, fixed: &[S], sides: &Sides<S>, results: &mut [S]) {
+        let work = |work: &mut [S], results: &mut [S]| {
+            for (&at, &value) in self.fixed.iter().zip(fixed) {
+                work[usize::from(at)] = value;
+            }
+            self.follow(place, sides, work, results);
+        };
+        self.in_room(work, results);
+    }
+
+    /// The same with these parameters.
+    pub fn run_with<S: Scalar>(
+        &self,
+        place: &Place<'_, S>,
+        parameters: &[S],
+        sides: &Sides<S>,
+        results: &mut [S],
+    ) {
+        self.run_anew(place, &|i| parameters[i], sides, results);
+    }
+
+    /// The first result with these parameters, on the upper side of every kink.
+    pub fn value<S: Scalar>(&self, place: &Place<'_, S>, parameters: &[S]) -> S {
+        self.value_at(place, &|i| parameters[i])
+    }
+
+    /// The same where parameters are asked for by their numbers.
+    pub fn value_at<S: Scalar>(&self, place: &Place<'_, S>, parameter: &dyn Fn(usize) -> S) -> S {
+        let mut results = [S::zero()];
+        self.run_anew(place, parameter, &[S::mask(true); MAX_SURFACES], &mut results);
+        results[0]
+    }
+
+    #[inline(never)]
+    fn run_anew<S: Scalar>(
+        &self,
+        place: &Place<'_, S>,
+        parameter: &dyn Fn(usize) -> S,
+        sides: &Sides<S>,
+        results: &mut [S],
+    ) {
+        let work = |work: &mut [S], results: &mut [S]| {
+            self.determine(parameter, work);
+            self.follow(place, sides, work, results);
+        };
+        self.in_room(work, results);
+    }
+
+    /// Does work with the registers.
+    #[inline(always)]
+    fn in_room<S: Scalar>(&self, work: impl Fn(&mut [S], &mut [S]), results: &mut [S]) {
+        if self.registers <= FEW {
+            work(&mut [S::zero(); FEW], results);
+        } else if self.registers <= MANY {
+            work(&mut [S::zero(); MANY], results);
+        } else {
+            work(&mut vec![S::zero(); self.registers], results);
+        }
+    }
+
+    /// Evaluates what only parameters determine.
+    #[inline(never)]
+    fn determine<S: Scalar>(&self, parameter: &dyn Fn(usize) -> S, work: &mut [S]) {
+        for (work, leaf) in work[self.states..].iter_mut().zip(&self.leaves) {
+            match *leaf {
+                Leaf::Number(value) => *work = S::constant(value),
+                Leaf::Parameter(i) => *work = parameter(i),
+                _ => {}
+            }
+        }
+        // None of them has a side.
+        self.perform(&self.first, &[S::mask(true); MAX_SURFACES], work);
+    }
+
+    /// Evaluates the rest.
+    #[inline(never)]
+    fn follow<S: Scalar>(&self, place: &Place<'_, S>, sides: &Sides<S>, work: &mut [S], results: &mut [S]) {
+        work[..self.states].copy_from_slice(&place.x[..self.states]);
+        let leaves = &self.leaves[..self.leaves.len() - self.constants];
+        for (work, leaf) in work[self.states..].iter_mut().zip(leaves) {
+            match *leaf {
+                Leaf::Time => *work = place.t,
+                Leaf::Rate(n) => *work = place.rates[n],
+                Leaf::Input(k) => *work = place.inputs[k],
+                Leaf::State(_) | Leaf::Number(_) | Leaf::Parameter(_) => {}
+            }
+        }
+        self.perform(&self.steps, sides, work);
+        for (result, &at) in results.iter_mut().zip(&self.results) {
+            *result = work[usize::from(at)];
+        }
+    }
+
+    /// Does the steps one after the other.
+    // One function for each kind of number: its loop is large.
+    #[inline(never)]
+    fn perform<S: Scalar>(&self, steps: &[Step], sides: &Sides<S>, work: &mut [S]) {
+        for step in steps {
+            let [a, b, c] = step.of.map(usize::from);
+            work[usize::from(step.to)] = match step.action {
+                Action::Add => work[a] + work[b],
+                Action::Sub => work[a] - work[b],
+                Action::Mul => work[a] * work[b],
+                Action::Div => work[a] / work[b],
+                Action::Neg => -work[a],
+                Action::Square => work[a].square(),
+                Action::MulAdd => work[a] * work[b] + work[c],
+                Action::MulSub => work[a] * work[b] - work[c],
+                Action::SubMul => work[c] - work[a] * work[b],
+                Action::Unary(function) => function.of(work[a]),
+                Action::Binary(function) => function.of(work[a], work[b]),
+                Action::Where => S::jumping(S::zero().less(work[a]), work[b], work[c]),
+                Action::On(kink, side) => kink.on(sides[usize::from(side)], &[work[a], work[b], work[c]]),
+                Action::Spline(own) => {
+                    let spline = self.splines[usize::from(own)];
+                    spline.of(work[a], &|i| work[b + i - spline.first])
+                }
+            };
+        }
+    }
+}
+
+/// How a value is made of others.
+#[derive(Clone, Copy, Debug)]
+struct Made {
+    op: Op,
+    of: [usize; 3],
+    /// Parameters and numbers determine it.
+    fixed: bool,
+}
+
+/// What two values that are made alike share: the operation's name, its numbers, and what it is made of.
+type Likeness = (&'static str, [u64; 6], [usize; 3]);
+
+/// All values of some formulas, equal ones merged. A value comes after those that it is made of.
+#[derive(Debug, Default)]
+struct Graph {
+    made: Vec<Made>,
+    known: HashMap<Likeness, usize>,
+}
+
+/// The operands, of those on the stack, that the value of an operation depends on.
+fn needed(op: Op) -> std::ops::Range<usize> {
+    match op {
+        Op::On(Kink::Sign, _) => 0..0,
+        // The side says what the condition is.
+        Op::On(Kink::Where, _) => 1..3,
+        op => 0..op.takes(),
+    }
+}
+
+impl Graph {
+    /// The value of a formula.
+    fn add(&mut self, formula: &Expression) -> usize {
+        let mut stack: Vec<usize> = Vec::new();
+        for &op in formula.ops() {
+            let operands = stack.split_off(stack.len() - op.takes());
+            let mut of = [0; 3];
+            of[..operands.len()].copy_from_slice(&operands);
+            if let Op::Spline(spline) = op {
+                // One after the other; a parameter may be one of several curves.
+                for (k, i) in spline.parameters().enumerate() {
+                    let at = self.coefficient(i, spline, k);
+                    of[1] = if k == 0 { at } else { of[1] };
+                }
+            }
+            stack.push(self.value(op, of));
+        }
+        stack[0]
+    }
+
+    /// The coefficient `k` of a curve.
+    fn coefficient(&mut self, parameter: usize, spline: Spline, k: usize) -> usize {
+        let likeness = ("coefficient", [spline.first as u64, spline.count as u64, k as u64, 0, 0, 0], [0; 3]);
+        let op = Op::Push(Leaf::Parameter(parameter));
+        self.merged(likeness, Made { op, of: [0; 3], fixed: true })
+    }
+
+    fn value(&mut self, op: Op, of: [usize; 3]) -> usize {
+        let mut numbers = [op.number().to_bits(), 0, 0, 0, 0, 0];
+        match op {
+            Op::On(_, side) => numbers[1] = 1 + u64::from(side),
+            Op::Spline(own) => {
+                numbers = [own.first as u64, own.count as u64, own.low.to_bits(), own.per.to_bits(), 0, 0];
+            }
+            _ => {}
+        }
+        let fixed = match op {
+            Op::Push(leaf) => matches!(leaf, Leaf::Number(_) | Leaf::Parameter(_)),
+            Op::On(..) => false,
+            op => needed(op).all(|i| self.made[of[i]].fixed),
+        };
+        let unary = u64::from(op.takes() == 1);
+        numbers[5] = unary;
+        self.merged((op.name(), numbers, of), Made { op, of, fixed })
+    }
+
+    fn merged(&mut self, likeness: Likeness, made: Made) -> usize {
+        *self.known.entry(likeness).or_insert_with(|| {
+            self.made.push(made);
+            self.made.len() - 1
+        })
+    }
+
+    /// Which values the results need, and how many of those need each.
+    fn uses(&self, results: &[usize]) -> Vec<usize> {
+        let mut uses = vec![0; self.made.len()];
+        results.iter().for_each(|&i| uses[i] += 1);
+        for i in (0..self.made.len()).rev() {
+            let Made { op, of, .. } = self.made[i];
+            if uses[i] == 0 {
+                continue;
+            }
+            needed(op).for_each(|k| uses[of[k]] += 1);
+            if let Op::Spline(spline) = op {
+                (0..spline.count).for_each(|k| uses[of[1] + k] += 1);
+            }
+        }
+        uses
+    }
+
+    /// A product that only this sum or difference needs.
+    fn product(&self, uses: &[usize], i: usize) -> Option<[usize; 2]> {
+        let Made { op, of: [a, b, _], fixed } = self.made[i];
+        (op == Op::Binary(Binary::Mul) && uses[i] == 1 && !fixed).then_some([a, b])
+    }
+
+    fn lower(&self, results: &[usize]) -> Program {
+        let uses = self.uses(results);
+        let is_leaf = |i: usize| matches!(self.made[i].op, Op::Push(_));
+        let live: Vec<usize> = (0..self.made.len()).filter(|&i| uses[i] > 0).collect();
+        let mut registers = Registers::new(self, live.iter().copied().filter(|&i| is_leaf(i)));
+        let mut parts: [Vec<(usize, Action, [usize; 3])>; 2] = Default::default();
+        let mut absorbed = vec![false; self.made.len()];
+        for i in live.into_iter().rev().filter(|&i| !is_leaf(i)) {
+            if absorbed[i] {
+                continue;
+            }
+            let Made { op, of, fixed } = self.made[i];
+            let [a, b, _] = of;
+            let (action, of) = match op {
+                Op::Binary(Binary::Add) if !fixed => match (self.product(&uses, a), self.product(&uses, b)) {
+                    (Some([f, g]), _) => (Action::MulAdd, [f, g, b]),
+                    (None, Some([f, g])) => (Action::MulAdd, [f, g, a]),
+                    (None, None) => (Action::Add, of),
+                },
+                Op::Binary(Binary::Sub) if !fixed => match (self.product(&uses, a), self.product(&uses, b)) {
+                    (_, Some([f, g])) => (Action::SubMul, [f, g, a]),
+                    (Some([f, g]), None) => (Action::MulSub, [f, g, b]),
+                    (None, None) => (Action::Sub, of),
+                },
+                op => (registers.action(op), of),
+            };
+            match action {
+                Action::SubMul => absorbed[b] = true,
+                Action::MulSub => absorbed[a] = true,
+                Action::MulAdd => absorbed[if of[2] == b { a } else { b }] = true,
+                _ => {}
+            }
+            parts[usize::from(!fixed)].push((i, action, of));
+        }
+        parts.iter_mut().for_each(|part| part.reverse());
+        registers.program(parts, results)
+    }
+}
+
+impl Action {
+    /// The operands whose registers are read.
+    fn reads(self) -> std::ops::Range<usize> {
+        match self {
+            Action::Neg | Action::Square | Action::Unary(_) | Action::Spline(_) => 0..1,
+            Action::Add | Action::Sub | Action::Mul | Action::Div | Action::Binary(_) => 0..2,
+            Action::MulAdd | Action::MulSub | Action::SubMul | Action::Where => 0..3,
+            Action::On(kink, side) => needed(Op::On(kink, side)),
+        }
+    }
+}
+
+/// Gives values their registers; one that nothing needs any more is used again.
+struct Registers<'a> {
+    graph: &'a Graph,
+    states: usize,
+    leaves: Vec<Leaf>,
+    constants: usize,
+    splines: Vec<Spline>,
+    of: Vec<u16>,
+    free: Vec<u16>,
+    count: usize,
+}
+
+impl<'a> Registers<'a> {
+    fn new(graph: &'a Graph, leaves: impl Iterator<Item = usize>) -> Self {
+        let mut of = vec![0; graph.made.len()];
+        let (mut others, mut states) = (Vec::new(), 0);
+        for i in leaves {
+            match graph.made[i].op {
+                Op::Push(Leaf::State(n)) => {
+                    of[i] = register(n);
+                    states = states.max(n + 1);
+                }
+                Op::Push(leaf) => others.push((i, leaf)),
+                _ => unreachable!("only leaves are pushed"),
+            }
+        }
+        others.sort_by_key(|&(i, _)| graph.made[i].fixed);
+        for (at, &(i, _)) in others.iter().enumerate() {
+            of[i] = register(states + at);
+        }
+        let constants = others.iter().filter(|&&(i, _)| graph.made[i].fixed).count();
+        let leaves: Vec<Leaf> = others.into_iter().map(|(_, leaf)| leaf).collect();
+        let count = states + leaves.len();
+        Self { graph, states, leaves, constants, splines: Vec::new(), of, free: Vec::new(), count }
+    }
+
+    fn action(&mut self, op: Op) -> Action {
+        match op {
+            Op::Push(_) => unreachable!("leaves have registers"),
+            Op::Unary(Unary::Neg) => Action::Neg,
+            Op::Unary(Unary::Power(2)) => Action::Square,
+            Op::Unary(function) => Action::Unary(function),
+            Op::Binary(Binary::Add) => Action::Add,
+            Op::Binary(Binary::Sub) => Action::Sub,
+            Op::Binary(Binary::Mul) => Action::Mul,
+            Op::Binary(Binary::Div) => Action::Div,
+            Op::Binary(function) => Action::Binary(function),
+            Op::Spline(spline) => {
+                self.splines.push(spline);
+                Action::Spline(register(self.splines.len() - 1))
+            }
+            Op::Where => Action::Where,
+            Op::On(kink, side) => Action::On(kink, side),
+        }
+    }
+
+    fn program(mut self, [first, rest]: [Vec<(usize, Action, [usize; 3])>; 2], results: &[usize]) -> Program {
+        // When each value is read for the last time. What the parameters determine stays: the steps can be done again.
+        let mut last = vec![None; self.graph.made.len()];
+        let mut fixed: Vec<usize> = Vec::new();
+        let mut reads = |i: usize| {
+            if self.graph.made[i].fixed && !fixed.contains(&i) {
+                fixed.push(i);
+            }
+        };
+        for (at, (_, action, of)) in rest.iter().enumerate() {
+            for k in action.reads() {
+                last[of[k]] = Some(at);
+                reads(of[k]);
+            }
+            if let Action::Spline(own) = action {
+                (0..self.splines[usize::from(*own)].count).for_each(|k| reads(of[1] + k));
+            }
+        }
+        results.iter().for_each(|&i| reads(i));
+        let made = &self.graph.made;
+        let first: Vec<Step> = first.iter().map(|&(i, action, of)| self.step(i, action, of)).collect();
+        let mut steps = Vec::with_capacity(rest.len());
+        for (at, &(i, action, of)) in rest.iter().enumerate() {
+            let operands = of.map(|k| self.of[k]);
+            for k in action.reads() {
+                let done = last[of[k]] == Some(at) && !made[of[k]].fixed && !results.contains(&of[k]);
+                let own = self.of[of[k]];
+                if done && usize::from(own) >= self.states + self.leaves.len() && !self.free.contains(&own) {
+                    self.free.push(own);
+                }
+            }
+            let mut step = self.step(i, action, of);
+            step.of = operands;
+            steps.push(step);
+        }
+        let at = |list: &[usize]| list.iter().map(|&i| self.of[i]).collect();
+        Program {
+            fixed: at(&fixed),
+            results: at(results),
+            states: self.states,
+            leaves: self.leaves,
+            constants: self.constants,
+            splines: self.splines,
+            first,
+            steps,
+            registers: self.count,
+        }
+    }
+
+    /// A step whose result has a register of its own.
+    fn step(&mut self, i: usize, action: Action, of: [usize; 3]) -> Step {
+        let of = of.map(|k| self.of[k]);
+        let to = self.free.pop().unwrap_or_else(|| {
+            self.count += 1;
+            register(self.count - 1)
+        });
+        self.of[i] = to;
+        Step { action, of, to }
+    }
+}
+
+fn register(i: usize) -> u16 {
+    u16::try_from(i).expect("fewer than 65536 values")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formula::Names;
+
+    fn program(texts: &[&str]) -> Program {
+        let names = |list: [&str; 2]| list.map(str::to_owned);
+        let (states, parameters) = (names(["x", "y"]), ["a", "b", "c", "d"].map(str::to_owned));
+        let names = Names { states: &states, parameters: &parameters, inputs: &[], rates: true };
+        let parsed: Vec<_> = texts.iter().map(|text| Expression::parse(text, names).unwrap()).collect();
+        Program::of(&parsed)
+    }
+
+    fn values(program: &Program, [a, b]: [f64; 2]) -> Vec<f64> {
+        let parameters = [a, b, 1.5, -2.5];
+        let place = Place { t: 0.5, x: &[2.0, -3.0], rates: &[7.0, 11.0], inputs: &[] };
+        let (mut results, mut again) = (vec![0.0; program.len()], vec![0.0; program.len()]);
+        let sides = [true; MAX_SURFACES];
+        program.run_with(&place, &parameters, &sides, &mut results);
+        program.run(&place, &program.fix(&parameters), &sides, &mut again);
+        assert_eq!(results, again);
+        results
+    }
+
+    #[test]
+    fn what_formulas_have_in_common_is_evaluated_once() {
+        // The sine, the product with it, and one that goes into a sum; of the parameters the square and the quotient.
+        let both = program(&["sin(x)*a^2", "b/a + y*sin(x)", "sin(x)"]);
+        assert_eq!((both.steps.len(), both.first.len()), (3, 2));
+        let sine = 2.0_f64.sin();
+        assert_eq!(values(&both, [5.0, 3.0]), [sine * 25.0, 3.0 / 5.0 + -3.0 * sine, sine]);
+        // Of parameters alone, of a leaf, of rates and time.
+        assert_eq!(values(&program(&["a*b - 1", "y", "x' + t*y'"]), [5.0, 3.0]), [14.0, -3.0, 12.5]);
+    }
+
+    #[test]
+    fn registers_are_used_again() {
+        let long = (0..60).map(|i| format!("(x + {i})*(y - {i})")).collect::<Vec<_>>().join(" - ");
+        let sum = program(&[&long]);
+        assert!(sum.registers < 2 + 60 + 4, "{}", sum.registers);
+        let wanted = (1..60).fold(-6.0, |all, i| all - (2.0 + f64::from(i)) * (-3.0 - f64::from(i)));
+        assert_eq!(values(&sum, [0.0, 0.0]), [wanted]);
+        // More than there is room for without an allocation.
+        let open = format!("{}x{}", "1 + (y*".repeat(90), ")".repeat(90));
+        let many = (0..90).map(|i| format!("sin(x + {i}.5)")).collect::<Vec<_>>().join("*(1 + ");
+        let many = program(&[&format!("{many}{}", ")".repeat(89)), &open]);
+        assert!(many.registers > MANY && values(&many, [0.0, 0.0]).iter().all(|value| value.is_finite()));
+    }
+
+    #[test]
+    fn curves_and_comparisons() {
+        let texts = ["spline(x, 0, 4, a, b, c, d)", "min(x, y) + max(x, a)*sign(y)", "where(x > y, a, b)"];
+        assert_eq!(values(&program(&texts[1..]), [5.0, 3.0]), [-8.0, 5.0]);
+        let own = program(&texts[..1]);
+        let wanted = Spline::new(0, 4, (0.0, 4.0), false).of(2.0, &|i| [5.0, 3.0, 1.5, -2.5][i]);
+        assert_eq!(values(&own, [5.0, 3.0]), [wanted]);
+    }
+}
