@@ -14,6 +14,10 @@ import pytest
 import udd
 from udd._util.progress import progress_bar, status
 
+TIMES = np.arange(0, 20, 0.05)
+NOISE = 1e-3 * np.random.default_rng(0).standard_normal(len(TIMES))
+SWING = udd.Measurement(TIMES, {"theta": 0.5 * np.exp(-TIMES / 50) * np.cos(3.13 * TIMES) + NOISE})
+
 WORK: dict[str, Callable[[Path, Any], object]] = {
     "lyapunov": lambda folder, p: udd.lyapunov([5.0, 6.0], t=200.0, tol=1.0, progress=p),
     "ensemble": lambda folder, p: udd.ensemble(udd.DLE(5.0), 1.0, [[1, 1, 0], [2, 1, 0]], progress=p),
@@ -23,6 +27,7 @@ WORK: dict[str, Callable[[Path, Any], object]] = {
     "sweep": lambda folder, p: udd.sweep(
         udd.SweepSpec("final_state", udd.DLE(1.0), {"w": [1.0, 2.0]}, options={"t": 1.0}), progress=p
     ),
+    "discover": lambda folder, p: udd.discover(SWING, udd.Pendulum(1.0, k0=0.1), progress=p),
     "reproduce": lambda folder, p: udd.paper.reproduce(folder, only=["scales"], progress=p),
     "render": lambda folder, p: udd.render(
         udd.simulate(udd.Disk(0.039), np.arange(0, 0.3, 0.005), [0, 0.001, 0.04, 0]),

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from udd.errors import ModelError
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 Progress = bool | Callable[[str], object] | None
 """True: a bar at once. False: nothing. A function: it gets the state of the work in words. None: a bar in a
@@ -172,6 +176,19 @@ def status(progress: Progress) -> Iterator[Callable[[str], None]]:
             yield tell
     else:
         yield lambda _text: None
+
+
+def with_status(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a function that says what it does: its `progress` becomes one to call, whatever was given."""
+
+    @functools.wraps(function)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+        given: Any = kwargs.pop("progress", None)
+        with status(given) as tell:
+            kwargs["progress"] = tell
+            return function(*args, **kwargs)
+
+    return wrapper
 
 
 def _check(progress: object) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from udd._util import background_import
 from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression
 from udd._util.parallel import parallel_map
+from udd._util.progress import Progress, with_status
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
 from udd.discovery.symbolic.expressions import is_single_term
@@ -55,6 +56,7 @@ _SHORTEST = 20  # frames: of fewer the first part determines no model and the re
 
 
 @checked_arguments(error=FitError)
+@with_status
 def discover(
     measurement: Measurement | Sequence[Measurement],
     model: Model | Sequence[Model],
@@ -67,7 +69,7 @@ def discover(
     candidates: Iterable[tuple[str, Expression]] = (),
     held_out: Iterable[int] | None = None,
     budget: float | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = None,
 ) -> Discovery:
     """Forward stepwise selection of missing effects, by score tests and held-out data.
 
@@ -127,8 +129,8 @@ def discover(
     budget : float, optional
         Seconds after which the search ends with what it has, which the verdict then says. The known model's
         fit, which comes first, and the last one are made in any case.
-    progress : callable, optional
-        Told in a few words what is being done.
+    progress : bool or callable, optional
+        True or None: show what is being done; False: nothing. A function gets it in words.
 
     Returns
     -------
@@ -152,7 +154,8 @@ def discover(
     >>> [effect.title for effect in found.effects]
     ['quadratic drag']
     """
-    clock = Clock(budget, progress or (lambda _text: None))
+    assert callable(progress)
+    clock = Clock(budget, progress)
     options = options_of(free, camera, priors, each)
     order, apart = _held_out(measurement, held_out)
     if apart and (each is not None or any("[" in name for name in priors or {})):

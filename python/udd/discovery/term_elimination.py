@@ -12,6 +12,7 @@ import numpy as np
 from udd import _core
 from udd._util import chi_squared
 from udd._util.arguments import checked_arguments
+from udd._util.progress import Progress, with_status
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, continuous, fit_record, record_of
 from udd.fitting.estimator_input import FilmParameters
@@ -80,6 +81,7 @@ class Pruned:
 
 
 @checked_arguments(error=FitError)
+@with_status
 def prune(
     measurement: Measurement | Sequence[Measurement],
     model: Model | Sequence[Model],
@@ -89,7 +91,7 @@ def prune(
     priors: Mapping[str, tuple[float, float]] | None = None,
     spread: float | None = None,
     alpha: float = ALPHA,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = None,
 ) -> Pruned:
     """Backward elimination of a model's terms, with exchanges.
 
@@ -114,8 +116,8 @@ def prune(
         precisely, mostly that of the lower powers. By default every term is priced alike.
     alpha : float
         Without a `spread`, the chance that a term that is not there is kept, over all of them together.
-    progress : callable, optional
-        Told in a few words what is being done.
+    progress : bool or callable, optional
+        True or None: show what is being done; False: nothing. A function gets it in words.
 
     Returns
     -------
@@ -139,7 +141,8 @@ def prune(
     >>> udd.prune(udd.Measurement(t, dict(zip("xv", (states + noise).T))), swing).kept
     ['k', 'a']
     """
-    tell = progress or (lambda _text: None)
+    assert callable(progress)
+    tell: Callable[[str], object] = progress
     tell("fitting all terms together")
     measurement = continuous(measurement, model)
     record = record_of(measurement, model)
@@ -202,7 +205,7 @@ class _Pruning:
     """The search for the likeliest set of terms."""
 
     def __init__(
-        self, names: list[str], price: float, spread: float | None, full: Fit, tell: Callable[[str], None]
+        self, names: list[str], price: float, spread: float | None, full: Fit, tell: Callable[[str], object]
     ) -> None:
         self.names, self.price, self.spread, self.full, self.tell = names, price, spread, full, tell
         # One unit for all: divided by its own scatter any chi2 is just the degrees of freedom.

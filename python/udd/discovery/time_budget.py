@@ -36,7 +36,7 @@ class Clock:
         The budget is no positive number.
     """
 
-    def __init__(self, budget: float | None, tell: Callable[[str], None]) -> None:
+    def __init__(self, budget: float | None, tell: Callable[[str], object]) -> None:
         if budget is not None and not (isinstance(budget, (int, float, np.integer)) and budget > 0):
             raise FitError(f"the budget must be a positive number of seconds, not {budget!r}")
         self.budget = math.inf if budget is None else float(budget)
