@@ -280,7 +280,7 @@ impl Unary {
                 let (sin, cos) = a.sin_cos();
                 sin / cos
             }
-            // A difference of exponentials would be 0 below 1e-16.
+            // As a difference of exponentials it would be 0 below 1e-16.
             Unary::Sinh => a.tanh() * Unary::Cosh.of(a),
             Unary::Cosh => (a.exp() + (-a).exp()).scale(0.5),
             Unary::Tanh => a.tanh(),
