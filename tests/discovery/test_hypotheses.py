@@ -12,7 +12,7 @@ import pytest
 
 import udd
 from udd.discovery import hypotheses
-from udd.discovery.hypotheses import Hypothesis, contains, log_evidence, log_prior, ranked, rivals
+from udd.discovery.hypotheses import Hypothesis, contains, log_evidence, log_prior, named, ranked, rivals
 from udd.discovery.results import AddedEffect
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.symbolic.expressions import is_power, is_single_term, length, read
@@ -124,6 +124,14 @@ def test_a_wider_law_is_a_rival_only_if_it_gains():
 def test_the_chosen_law_in_other_words_is_no_rival():
     again = udd.effects.formula("friction", "a*abs(Omega)", amplitudes=["a"], a=0.01)
     assert rivals(hypothesis(100.0, QUADRATIC), [hypothesis(99.0, again, formula="1*x")], KNOWN) == []
+
+
+def test_the_law_of_the_library_comes_before_the_same_in_other_words():
+    formula = hypothesis(100.0, power(1.0), formula="1.0*x^1.0")
+    law, other = hypothesis(95.0, QUADRATIC), hypothesis(97.0, CUBIC)
+    assert named([formula, other, law], KNOWN) == [law, formula, other]
+    far = hypothesis(85.0, QUADRATIC)
+    assert named([formula, far], KNOWN) == [formula, far]
 
 
 def test_a_spline_is_a_rival_of_splines_alone():

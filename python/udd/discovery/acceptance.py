@@ -27,7 +27,7 @@ from udd.errors import FitError
 from udd.fitting import Fit, Record, at_level, eased, far_off, ran_away, refit, released_anew, started_at
 from udd.fitting.parameters import Free
 
-from .hypotheses import Hypothesis, log_evidence, log_prior, ranked, rivals, spent
+from .hypotheses import Hypothesis, log_evidence, log_prior, named, ranked, rivals, spent
 from .results import Alternative
 from .score_rounds import ScoreRound
 from .thresholds import ALPHA, Confirmation
@@ -170,6 +170,11 @@ class Acceptance:
         self.record, self.held_out, self.clock, self.unit = record, held_out, clock, unit
         self.free = free
 
+    @property
+    def known(self) -> list[str]:
+        """Names of the known model's free parameters."""
+        return [f.name for f in self.free if f.role == "model"]
+
     def errors(self, fitted: Fit) -> Errors:
         """Held-out errors of a fit of the first part."""
         return held_out_errors(fitted, self.record, self.held_out, unit=self.unit)
@@ -188,9 +193,10 @@ class Acceptance:
     ) -> tuple[Step, SearchState] | None:
         """The likeliest hypothesis, if it passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
-        order = ranked(self.hypotheses(current, trials, scores))
+        order = named(ranked(self.hypotheses(current, trials, scores)), self.known)
         # Where the likeliest fails a test, a clearly less likely one is not named instead.
-        for chosen in (h for h in order if h.log_z >= order[0].log_z - EVIDENCE_MARGIN):
+        most = max((h.log_z for h in order), default=0.0)
+        for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
             trial = self._in_other_widths(current, chosen.trial, scores.library)
             judged = self.judged(current, trial, scores)
             if judged is None or judged.witness is None:
@@ -384,7 +390,7 @@ class Acceptance:
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
-        for other in rivals(chosen, order, [f.name for f in self.free if f.role == "model"]):
+        for other in rivals(chosen, order, self.known):
             for mine, theirs in _beside(chosen.trial.candidates, other.trial.candidates):
                 if theirs.title == mine.title:
                     continue  # but for the width that its sign is smoothed over

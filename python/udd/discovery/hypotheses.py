@@ -204,6 +204,26 @@ def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     return sorted(hypotheses, key=lambda h: round(most - h.log_z))
 
 
+def named(order: Sequence[Hypothesis], known: Sequence[str]) -> list[Hypothesis]:
+    """The hypotheses in order, but first the library's law if it says the same as the formula that leads.
+
+    Parameters
+    ----------
+    order : sequence of Hypothesis
+        The best first.
+    known : sequence of str
+        Names of the known model's free parameters.
+    """
+    if not order or order[0].trial.formula is None:
+        return list(order)
+    first = order[0]
+    for other in order[1:]:
+        near = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
+        if near and other.constants <= first.constants and contains(other, first, known):
+            return [other, *(h for h in order if h is not other)]
+    return list(order)
+
+
 def rivals(
     chosen: Hypothesis, others: Sequence[Hypothesis], known: Sequence[str], margin: float = EVIDENCE_MARGIN
 ) -> list[Hypothesis]:
