@@ -81,7 +81,7 @@ def test_pieces_are_the_bits_of_one_call_of_simulate(model: dict[str, Any], stat
 def test_a_run_that_leaves_the_wheels_ends_where_simulate_ends() -> None:
     start = spec.start_of({"model": {"kind": "disk", "W": 0.042}, "state": [3.0, 0.005, 0.0, 0.0]})
     with pytest.warns(IncompleteWarning, match="left the wheels"):
-        whole = udd.simulate(start.model, np.arange(60_000) / 240, list(start.state))
+        whole = udd.simulate(start.model, np.arange(60_000) / 240, list(start.state), method="dopri5")
     assert whole.outcome == "ejected"
     run = growing_run.Run(start)
     rows, last = run.piece(0, 60_000)
@@ -103,7 +103,7 @@ def test_the_table_holds_the_same_bits(client: TestClient) -> None:
     lines = [line for line in answer.text.splitlines() if not line.startswith("#")]
     assert lines[0] == "t,Omega,Y,Z,beta"
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"])
+    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"], method="dopri5")
     np.testing.assert_array_equal(table[:, 0], whole.t[:481])
     np.testing.assert_array_equal(table[:, 1:], whole.state[:481])
 
@@ -123,7 +123,7 @@ def test_a_page_gets_pieces_tagged_with_its_generation(client: TestClient) -> No
         tail, second = piece(socket.receive_bytes())
     assert head == (1, 7, 0, 0, 120, 8, 0, 0)
     assert tail == (1, 7, 0, 120, 240, 8, 0, 0)
-    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"])
+    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"], method="dopri5")
     np.testing.assert_array_equal(np.vstack([first, second])[:, :4], whole.state[:360])
 
 
@@ -135,7 +135,7 @@ def test_a_dropped_connection_goes_on_where_it_was(client: TestClient) -> None:
     with client.websocket_connect(SOCKET) as socket:
         socket.send_json(asked(CHAOS, 120))
         _, after = piece(socket.receive_bytes())
-    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"])
+    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"], method="dopri5")
     np.testing.assert_array_equal(np.vstack([before, after])[:, :4], whole.state[:240])
 
 

@@ -165,7 +165,8 @@ def test_what_dies_down_slowly_is_scored_where_it_is_held_tightly() -> None:
     assert fitted.scatter > 3.0
     scores = score_round(fitted)
     assert scores.fit is fitted
-    assert scores.usable()[0].candidate.effect.name in ("quadratic_drag", "cubic_drag")
+    drags = {"quadratic_drag", "cubic_drag", "power_drag", "threshold_drag", "warming_friction"}
+    assert scores.usable()[0].candidate.effect.name in drags
 
 
 def bump(momentum: str) -> udd.effects.Effect:

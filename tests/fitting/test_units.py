@@ -55,7 +55,7 @@ def test_a_strong_relaxation_is_found_with_the_drive_as_stated():
     assert {"relaxation", "slip"} >= {f.effect.name for f in found.effects} and len(found.effects) == 1
     assert abs(found.fit.parameters["W"] / DRIVE - 1) < 0.01
     ((pull, error),) = [(f.parameters[a], f.errors[a]) for f in found.effects for a in f.effect.amplitudes]
-    pull, error = (pull, error) if pull > 1 else (-pull / DRIVE, error / DRIVE)
+    pull, error = (pull, error) if pull > 1 else (pull / DRIVE, error / DRIVE)  # a slip b W Z
     assert abs(pull - 12.0) < 4.5 * np.hypot(error, 0.004 * 12)
 
 
