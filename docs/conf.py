@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from importlib.metadata import version as version_of
 from pathlib import Path
+
+os.environ["TQDM_DISABLE"] = "1"  # a page that takes longer than a bar's patience must not show one
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -253,6 +253,14 @@ def test_each_doubt_leaves_the_form_open(monkeypatch):
     assert "less than 10 nats" in doubts_of([little], numbers, (0.99, 0.98, 1.01), 1000)[0]
 
 
+def test_friction_over_the_time_alone_leaves_the_form_open(monkeypatch):
+    monkeypatch.setattr("udd.discovery.verdict.readings", lambda _fit: [])
+    settles = udd.effects.warming_friction(a=0.01, tau=30.0)
+    numbers = final(warming_friction__a=(0.01, 0.001))
+    (doubt,) = doubts_of([added(settles)], numbers, (0.5, 0.4, 0.6), 1000)
+    assert "the time stands for its size" in doubt
+
+
 @pytest.mark.parametrize(
     ("effects", "unconfirmed", "doubts", "open_form", "stopped", "verdict"),
     [
