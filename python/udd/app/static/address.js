@@ -88,7 +88,7 @@ export function python({ model, state }, catalogue) {
     "",
     "n = 10_000  # states; a run twice as long, as its last step is cut to its end",
     `t = np.arange(2 * n) / ${per}`,
-    `run = udd.simulate(${call}(${[numbers[drive], ...rest].join(", ")}), t, [${state.join(", ")}])`,
+    `run = udd.simulate(${call}(${[numbers[drive], ...rest].join(", ")}), t, [${state.join(", ")}], method="dopri5")`,
     "t, state = t[:n], run.state[:n]",
     "",
   ].join("\n");
