@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,17 +136,6 @@ class TestResult:
     drifts: bool = False
 
 
-def _compared(trials: Sequence[TrialFit], level: int) -> list[TrialFit]:
-    """Trials held as tightly as one another, without those that cannot be solved there."""
-    result = []
-    for trial in trials:
-        try:
-            result.append(replace(trial, compared=at_level(trial.fit, level)))
-        except FitError:
-            continue
-    return result
-
-
 def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
     """A proposal fitted to all data, from where a fit of these without it ended."""
     if trial.curve is None:
@@ -244,7 +233,8 @@ class Acceptance:
         else:  # what is held as stated bends forms: only with it free, and all data, do they compare
             least = min((t.fit.scatter for t in trials), default=0.0)
             near = sorted((t for t in trials if t.fit.scatter < _BENT * least), key=lambda t: t.fit.scatter)
-        near = [trial for trial in trials if trial in near[:_COMPARED]]
+        likeliest = {id(trial) for trial in near[:_COMPARED]}
+        near = [trial for trial in trials if id(trial) in likeliest]
 
         def whole(trial: TrialFit) -> Hypothesis | None:
             try:
@@ -281,8 +271,7 @@ class Acceptance:
                 if other.kin == curve.kin:
                     pairs |= {(curve.name, f.text): (curve, f) for f in formulas}
         some = list(pairs.values())
-        if some:
-            self.clock.tell(f"trying {some[0][1].text}" + (f" and {len(some) - 1} more" if some[1:] else ""))
+        self.clock.trying([formula.text for _curve, formula in some])
         return fitted_ones(self.clock.each(lambda pair: of_formula(current.part, *pair), some))
 
     def _shortened(self, current: SearchState, order: Sequence[Hypothesis]) -> list[TrialFit]:
@@ -316,7 +305,14 @@ class Acceptance:
         found = fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
         level = trial.fit.level
         some = [trial, *(t for t in found if t.fit.level >= level and t.needed)]
-        return min(_compared(some, level), key=lambda t: t.compared.chi2, default=trial)
+
+        def chi2(one: TrialFit) -> float:  # held as tightly as the others
+            try:
+                return at_level(one.fit, level).chi2
+            except FitError:
+                return math.inf
+
+        return min(some, key=chi2)
 
     def all_are_free(self, fitted: Fit) -> bool:
         """Whether everything is free that the user leaves free, as where a search begins it may not be."""

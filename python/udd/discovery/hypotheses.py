@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.scoring.look_alikes import by_parameter
 from udd.discovery.symbolic.expressions import is_power, length
 from udd.effects import Effect
 from udd.errors import ModelError
 from udd.fitting import Fit
-from udd.models import Model
 
 from .trial_fits import TrialFit
 
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 _SYMBOL = math.log(12)  # nats: a formula's symbol is one of so many operations and functions
 _PLACES = 400  # of a motion, at which laws are compared
 _EQUAL = 1e-2  # of a law's size: two that differ by less are one
-_STEP = 1e-5  # of a parameter, by which differences are taken
 
 
 def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
@@ -134,7 +133,8 @@ def contains(law: Hypothesis, other: Hypothesis, known: Sequence[str]) -> bool:
     model = other.whole.model
     plain = model.with_effects(model.effects[: len(model.effects) - len(other.trial.candidates)])
     without = plain.rates(t, states)
-    basis = _span(plain, [name for name in known if name in plain.parameters], t, states)
+    able = by_parameter(plain, [name for name in known if name in plain.parameters], t, states)
+    basis = np.linalg.qr(able)[0]
 
     def left(rates: Array) -> Array:
         work = (rates - without).ravel()
@@ -183,17 +183,6 @@ def _starts(effects: Sequence[Effect], values: Mapping[str, float], varied: Sequ
                     yield np.array([end if other == name else values[other] for other in varied])
 
 
-def _span(model: Model, names: Sequence[str], t: Array, states: Array) -> Array:
-    """Orthonormal basis of the changes of a model's rates with its parameters, (n d, p)."""
-    rates, columns = model.rates(t, states).ravel(), [np.zeros(states.size)]
-    for name in names:
-        step = _STEP * (abs(model.parameters[name]) or 1.0)
-        moved = model.with_parameters({name: model.parameters[name] + step})
-        columns.append((moved.rates(t, states).ravel() - rates) / step)
-    basis: Array = np.linalg.qr(np.stack(columns[bool(names) :], axis=-1))[0]
-    return basis
-
-
 def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses in order of their log evidence, the best first.
 
@@ -224,17 +213,15 @@ def named(order: Sequence[Hypothesis], known: Sequence[str]) -> list[Hypothesis]
     return list(order)
 
 
-def rivals(
-    chosen: Hypothesis, others: Sequence[Hypothesis], known: Sequence[str], margin: float = EVIDENCE_MARGIN
-) -> list[Hypothesis]:
+def rivals(chosen: Hypothesis, others: Sequence[Hypothesis], known: Sequence[str]) -> list[Hypothesis]:
     """The hypotheses that the data cannot tell from the chosen one.
 
-    Those within `margin` nats of it, but no spline beside a law, nothing that the chosen one contains, and
+    Those within ten nats of it, but no spline beside a law, nothing that the chosen one contains, and
     nothing that contains the chosen one with more constants and does not gain by them.
     """
     result = []
     for other in others:
-        if other is chosen or other.log_z < chosen.log_z - margin:
+        if other is chosen or other.log_z < chosen.log_z - EVIDENCE_MARGIN:
             continue
         if other.trial.is_curve:
             if chosen.trial.is_curve:

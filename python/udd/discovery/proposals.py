@@ -29,7 +29,6 @@ from .trial_fits import (
     with_more,
 )
 
-_EXPLAINED = 1.6  # chi2 per degree of freedom below which nothing strong is missing
 _TRIED = 12  # of the best candidates, fitted in full
 _ALIKE = 6  # more of them, that do nearly the same as the best
 _TOGETHER = 6  # pairs that may pass only together
@@ -111,7 +110,7 @@ class Proposals:
 
     def curves(self, likely: list[Curve]) -> list[TrialFit]:
         """Curves, located as splines."""
-        self._trying([curve.title for curve in likely])
+        self.clock.trying([curve.title for curve in likely])
         return fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely))
 
     def tried(self, some: list[Scored]) -> list[TrialFit]:
@@ -120,7 +119,7 @@ class Proposals:
 
     def _singles(self, passing: list[Scored]) -> list[TrialFit]:
         best = [(s.candidate, list(s.amplitudes)) for s in _machines_first(passing)]
-        self._trying([candidate.title for candidate, _amplitudes in best])
+        self.clock.trying([candidate.title for candidate, _amplitudes in best])
         # A wrong one may take a hundred times as long as the right one, which most often is the first.
         first = self._in_full(best[:1])
         return self._worthwhile(one_of_each(first + self._in_full(best[1:], self._beside(first))))
@@ -151,7 +150,7 @@ class Proposals:
         others = [s.candidate for s in self.scores.library.scored if s.candidate.effect.name not in names]
         best = min(tried, key=lambda t: t.rank)
         likest = look_alikes(self.fit.model, best.fit, others)[:_ALIKE]
-        self._trying([candidate.title for candidate, _amplitude in likest])
+        self.clock.trying([candidate.title for candidate, _amplitude in likest])
         some = [(candidate, [amplitude]) for candidate, amplitude in likest]
         return one_of_each(self._in_full(some, self._beside(tried)))
 
@@ -207,9 +206,5 @@ class Proposals:
                 return from_none(self.fit, group, goal)
             return with_more(self.fit, first, group, goal)
 
-        self._trying([" with ".join(c.title for c in group) for group in groups])
+        self.clock.trying([" with ".join(c.title for c in group) for group in groups])
         return fitted_ones(self.clock.each(together, groups))
-
-    def _trying(self, titles: list[str]) -> None:
-        if titles:
-            self.clock.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))

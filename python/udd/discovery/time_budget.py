@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -47,6 +47,11 @@ class Clock:
         self.doing = text
         self.check()
         self._tell(text)
+
+    def trying(self, titles: Sequence[str]) -> None:
+        """Begin to fit proposals, if there are any, unless the time is up."""
+        if titles:
+            self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
     def finish(self, text: str) -> None:
         """Begin something that is done in any case."""

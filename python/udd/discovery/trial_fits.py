@@ -46,8 +46,7 @@ class TrialFit:
     ----------
     candidates : list of Candidate
         The effects, as they were proposed.
-    fit, compared : Fit
-        The fit, and the same held as tightly as those that it is compared with.
+    fit : Fit
     names : list of str
         The parameters that came in with it.
     price : float
@@ -62,7 +61,6 @@ class TrialFit:
 
     candidates: list[Candidate]
     fit: Fit
-    compared: Fit
     names: list[str]
     price: float
     freedom: float
@@ -119,7 +117,7 @@ def of_library(
         return None
     names = [name for c in candidates for name in c.amplitude_names]
     price = price_of(fitted) * sum(c.parameters for c in candidates)
-    trial = TrialFit(candidates, fitted, fitted, names, price, len(names))
+    trial = TrialFit(candidates, fitted, names, price, len(names))
     return trial if trial.physical and fitted.converged else None
 
 
@@ -149,7 +147,7 @@ def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
         return None
     candidate = Candidate(located.effect, curve.title)
     price = 2 * located.price + _excess(current, located.curve)
-    return TrialFit([candidate], located.fit, located.fit, [], price, located.curve.df, located.curve)
+    return TrialFit([candidate], located.fit, [], price, located.curve.df, located.curve)
 
 
 def _excess(current: Fit, curve: Curve) -> float:
@@ -181,7 +179,7 @@ def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None =
     effect = fitted.model.effects[-1]
     names = [f"{name}.{p}" for p in effect.parameters]
     price, free = price_of(fitted) * len(names), len(names)
-    trial = TrialFit([Candidate(effect, effect.title)], fitted, fitted, names, price, free, curve, written)
+    trial = TrialFit([Candidate(effect, effect.title)], fitted, names, price, free, curve, written)
     return trial if trial.physical and fitted.converged else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ def look_alikes(known: Model, fitted: Fit, candidates: Iterable[Candidate]) -> l
     t, states = fitted.record.t[first], fitted.states[first]
     known = known.with_parameters({name: fitted.model.parameters[name] for name in known.parameters})
     without = known.rates(t, states)
-    absorbed = _by_parameter(
+    absorbed = by_parameter(
         known, [name for name in known.parameters if name in fitted.parameters], t, states
     )
 
@@ -79,10 +79,10 @@ def look_alikes(known: Model, fitted: Fit, candidates: Iterable[Candidate]) -> l
     return [(candidate, amplitude) for _likeness, candidate, amplitude in found]
 
 
-def _by_parameter(
-    model: Model, names: list[str], t: NDArray[np.float64], states: NDArray[np.float64]
+def by_parameter(
+    model: Model, names: Sequence[str], t: NDArray[np.float64], states: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Derivatives of the rates by parameters, by differences: (n d, p)."""
+    """Differentiate the rates by parameters, by finite differences: (n d, p)."""
     rates = model.rates(t, states).ravel()
     columns = []
     for name in names:
