@@ -76,6 +76,11 @@ class DynamicsProfile:
     averages: Callable[[Any, Floats, Floats, Floats], dict[str, float]] | None = None
     inside: Callable[[Parameters, Floats], NDArray[np.bool_]] | None = None
 
+    @property
+    def rate_unit(self) -> str:
+        """The unit of a rate, one over the time's; 1 where the time has none."""
+        return f"1/{self.time_unit}" if self.time_unit else "1"
+
 
 @dataclass(frozen=True)
 class SensorProfile:

@@ -116,12 +116,7 @@ def _of_spectra(result: Any) -> tuple[str, Array, Array, Array, str]:
     unit = given[0].model.units[varied[0]]
     x = np.array([other[varied[0]] for other in settings])
     y, sd = (np.array([getattr(one, name) for one in given]) for name in ("exponents", "standard_errors"))
-    return f"{varied[0]} [{unit or '1'}]", x, y, sd, _rate_unit(given[0].model)
-
-
-def _rate_unit(model: Any) -> str:
-    unit = model.profile.dynamics.time_unit
-    return f"1/{unit}" if unit else "1"
+    return f"{varied[0]} [{unit or '1'}]", x, y, sd, given[0].model.profile.dynamics.rate_unit
 
 
 def spectrum(result: Any, ax: Axes | None = None) -> Axes:
@@ -170,7 +165,7 @@ def spectrum(result: Any, ax: Axes | None = None) -> Axes:
     ax.set_xticks(number)
     ax.set_xlim(0.5, len(number) + 0.5)
     ax.set_xlabel("number of the exponent [1]")
-    ax.set_ylabel(f"Lyapunov exponent [{_rate_unit(result.model)}]")
+    ax.set_ylabel(f"Lyapunov exponent [{result.model.profile.dynamics.rate_unit}]")
     legend_above(ax)
     tidy(ax)
     return ax

@@ -91,15 +91,13 @@ def eigenvalues(result: Any, ax: Axes | None = None) -> Axes:
     >>> udd.plot.eigenvalues(udd.equilibria(udd.DLE(8.0))[0]).get_xlabel()
     'real part [1]'
     """
-    ax_given = ax
     if hasattr(result, "eigenvalues"):
-        values, unit = result.eigenvalues, result.model.profile.dynamics.time_unit
-        unit = f"1/{unit}" if unit else "1"
+        values, unit = result.eigenvalues, result.model.profile.dynamics.rate_unit
     elif hasattr(result, "multipliers"):
         values, unit = result.multipliers, "1"
     else:
         raise UddError(f"an equilibrium has eigenvalues, not {type(result).__name__}")
-    ax = new_axes(ax_given)
+    ax = new_axes(ax)
     inside = np.abs(values) < 1 if hasattr(result, "multipliers") else values.real < 0
     if hasattr(result, "multipliers"):
         turn = np.linspace(0, 2 * np.pi, 200)

@@ -72,11 +72,6 @@ def _time_unit(model: Model) -> str:
     return model.profile.dynamics.time_unit or "1"
 
 
-def _rate_unit(model: Model) -> str:
-    unit = model.profile.dynamics.time_unit
-    return f"1/{unit}" if unit else "1"
-
-
 # --- Lyapunov exponents
 
 
@@ -90,7 +85,7 @@ def _lyapunov_options(model: Model, given: Mapping[str, Any]) -> Options:
 
 
 def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
-    unit = _rate_unit(model)
+    unit = model.profile.dynamics.rate_unit
     return (
         Variable("value", unit, "largest Lyapunov exponent"),
         Variable("standard_error", unit, "its standard error"),
@@ -99,7 +94,7 @@ def _lyapunov_variables(model: Model) -> tuple[Variable, ...]:
 
 
 def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
-    unit = _rate_unit(model)
+    unit = model.profile.dynamics.rate_unit
     numbers = (("number", len(model.state_names)),)
     return (
         Variable("value", unit, "Lyapunov exponents", more=numbers),
