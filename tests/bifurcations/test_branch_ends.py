@@ -5,41 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import tutorial_models
 import udd
+from tutorial_models import BRUSSELATOR, FITZHUGH, LORENZ84, LURE, ROESSLER, SEASONS
 
-MORRIS_LECAR = udd.Model(
-    ["V", "w"],
-    {
-        "V": "(I - gCa*(1 + tanh((V - V1)/V2))/2*(V - ECa) - gK*w*(V - EK) - gL*(V - EL))/C",
-        "w": "phi*((1 + tanh((V - V3)/V4))/2 - w)*cosh((V - V3)/(2*V4))",
-    },
-    {"I": 60.0, "C": 20.0, "gCa": 4.4, "gK": 8.0, "gL": 2.0, "ECa": 120.0, "EK": -84.0, "EL": -60.0}
-    | {"V1": -1.2, "V2": 18.0, "V3": 2.0, "V4": 30.0, "phi": 0.04},
-)
-LURE = udd.Model(["x", "y", "z"], ["y", "z", "-al*z - be*y - x + x^2"], {"al": 1.2, "be": 1.0})
+MORRIS_LECAR = tutorial_models.MORRIS_LECAR.with_parameters({"I": 60.0})
 REACTOR = udd.Model(
     ["x1", "x2"],
     ["-x1 + Da*(1 - x1)*exp(x2)", "-x2 + B*Da*(1 - x1)*exp(x2) - beta*x2"],
     {"B": 7.06, "beta": 0.74, "Da": 0.15},
-)
-LORENZ84 = udd.Model(
-    ["x", "y", "z"],
-    ["-y^2 - z^2 - a*x + a*F", "x*y - b*x*z - y + G", "b*x*y + x*z - z"],
-    {"a": 0.25, "b": 4.0, "G": 0.3, "F": 3.0},
-)
-BRUSSELATOR = udd.Model(["x", "y"], ["A + x^2*y - (b + 1)*x", "b*x - x^2*y"], {"A": 1.3, "b": 3.5})
-ROESSLER = udd.Model(["x", "y", "z"], ["-y - z", "x + a*y", "b + z*(x - c)"], {"a": 0.17, "b": 0.4, "c": 3.0})
-FITZHUGH = udd.Model(["v", "w"], ["v - v^3/3 - w + I", "0.08*(v + 0.7 - 0.8*w)"], {"I": 0.8})
-# A seasonal predator and its prey: the seasons are an oscillator of their own.
-SEASONS = udd.Model(
-    ["x", "y", "u", "v"],
-    [
-        "r*(1 - x/K)*x - a*x*y/(b0*(1 + ep*u) + x)",
-        "e*a*x*y/(b0*(1 + ep*u) + x) - d*y",
-        "u*(1 - u^2 - v^2) - 2*pi*v",
-        "v*(1 - u^2 - v^2) + 2*pi*u",
-    ],
-    {"K": 1.0, "r": 6.28, "a": 12.56, "b0": 0.25, "e": 1.0, "d": 6.28, "ep": 0.2},
 )
 
 

@@ -7,31 +7,10 @@ import pytest
 from scipy import integrate
 
 import udd
+from tutorial_models import BAZYKIN, CO, REACTION
+from tutorial_models import LORENZ84 as STRONGER
 
-CO = udd.Model(
-    ["x", "y", "s"],
-    [
-        "2*q1*(1 - x - y - s)^2 - 2*q5*x^2 - q3*x*y",
-        "q2*(1 - x - y - s) - q6*y - q3*x*y",
-        "q4*(1 - x - y - s) - k*q4*s",
-    ],
-    {"q1": 2.5, "q2": 1.04, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4},
-)
-BAZYKIN = udd.Model(
-    ["x", "y"],
-    ["x - x*y/(1 + al*x) - e*x^2", "-g*y + x*y/(1 + al*x) - d*y^2"],
-    {"e": 0.01, "g": 1.0, "d": 0.1, "al": 0.2},
-)
-REACTION = udd.Model(
-    ["u", "v"],
-    ["-u + p1*(1 - u)*exp(v)", "-v + p1*p2*(1 - u)*exp(v) - p3*v"],
-    {"p1": 0.05, "p2": 14.0, "p3": 2.0},
-)
-LORENZ84 = udd.Model(
-    ["x", "y", "z"],
-    ["-y^2 - z^2 - a*x + a*F", "x*y - b*x*z - y + G", "b*x*y + x*z - z"],
-    {"a": 0.25, "b": 4.0, "G": 1.6, "F": 2.0},
-)
+LORENZ84 = STRONGER.with_parameters({"G": 1.6, "F": 2.0})
 
 
 def _positive(model: udd.Model) -> udd.Equilibrium:
