@@ -31,7 +31,7 @@ _EXPONENT = 0.1  # by which a named exponent may be off
 
 @dataclass(frozen=True)
 class Truth:
-    """What a record lacks: where it stands, over which coordinate, in which form.
+    """The law that a record lacks: where it stands, over which coordinate, in which form.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ def _kind(name: str, formula: Any, *, positive: bool = True) -> Kind:
 
 Maker = Callable[[np.random.Generator], Drawn]
 _SPEED = ("friction", "|Omega|")
-#: What draws a record, by the name of what is missing.
+#: Makers of records, by the name of the missing law.
 KINDS: dict[str, Maker] = {
     "pendulum: power 1.2": partial(powered, 0.2, 0.02),
     "pendulum: power 1.5": partial(powered, 0.5, 0.009),
@@ -291,7 +291,7 @@ def near_cases(numbers: Iterable[int], kinds: Iterable[str] = KINDS) -> Iterator
     return (NearCase(title, number) for number in numbers for title in kinds)
 
 
-#: What the library's own effects are: slot, coordinate, form, exponent.
+#: The library's own effects: slot, coordinate, form, exponent.
 _NAMED = {
     "quadratic_drag": Truth(*_SPEED, "power", 2.0),
     "cubic_drag": Truth(*_SPEED, "power", 3.0),
@@ -303,7 +303,7 @@ _NAMED = {
 
 
 def meaning(effect: udd.effects.Effect) -> Truth:
-    """What an effect says is missing."""
+    """Return the law that an effect names."""
     if effect.name in _NAMED:
         return _NAMED[effect.name]
     text, slot = effect.equation, effect.slots[0]
@@ -330,7 +330,7 @@ def meaning(effect: udd.effects.Effect) -> Truth:
 
 @dataclass
 class NearScore:
-    """What came of a record."""
+    """The score of a record."""
 
     title: str
     number: int
@@ -346,7 +346,7 @@ class NearScore:
     error: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the score as plain data."""
         return {"batch": "near", **asdict(self)}
 
 
