@@ -74,7 +74,7 @@ test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" fo
 bench-page: .venv/.browser ## the page's frames per second and its delay from slider to frame
 	$(PY) benches/python/page.py
 
-lint: lint-rust lint-python ## rustfmt, clippy, ruff, zizmor, mypy --strict, and the stub of udd._core against the module
+lint: lint-rust lint-python ## rustfmt, clippy, ruff, zizmor, mypy --strict, the stub of udd._core, and the prose of the change
 
 lint-rust: .venv/.made
 	cargo fmt --all --check
@@ -85,6 +85,7 @@ lint-python: .venv/.ready-user .venv/.ready-lint
 	$(BIN)/ruff format --check
 	$(BIN)/lint-imports
 	$(BIN)/zizmor --offline --quiet .github
+	$(PY) tools/prose.py --diff
 	$(STEP) "mypy" $(BIN)/mypy --strict python/udd
 	$(STEP) "stubtest" $(PY) -m mypy.stubtest udd._core --mypy-config-file pyproject.toml
 
