@@ -36,3 +36,12 @@ def test_every_page_is_in_the_table_of_contents() -> None:
 def test_the_gallery_has_every_plot_function() -> None:
     shown = set(re.findall(r"udd\.plot\.(\w+)\(", (DOCS / "pictures.md").read_text(encoding="utf-8")))
     assert shown == set(udd.plot.__all__)
+
+
+def test_the_changelog_has_a_short_line_for_each_change() -> None:
+    text = (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert len(text.encode()) <= 8000
+    changes = re.split(r"\n(?=- |\n)", text)
+    assert [change for change in changes if change.startswith("- ") and len(change) > 140] == []
+    for heading in re.findall("^## (.*)$", text, re.MULTILINE):
+        assert re.fullmatch(r"\d+\.\d+\.\d+ - \d{4}-\d\d-\d\d|Unreleased", heading)
