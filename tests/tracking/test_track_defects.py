@@ -19,6 +19,7 @@ from tracked_errors import errors, rms
 from udd.cli import main
 from udd.errors import IncompleteWarning, UddError
 from udd.film import Defects
+from udd.film.motion import motion_of, then_falling
 from udd.markers.layout import BODY
 from udd.tracking import overlay, pictures_at
 from udd.tracking.detection.colour_blobs import COLOURS, Blobs, squares
@@ -64,8 +65,26 @@ def test_after_the_disk_has_left_nothing_is_invented(tmp_path: Path) -> None:
         m = udd.track(film.path, pivot=film.pivot)
     last = int(np.flatnonzero(film.held)[-1])
     assert not film.held[-1] and m.seen[: last - 1].all()
-    assert not m.seen[last + 3 :].any()  # said within two frames
-    assert all(flag.startswith("gone") for flag in m.flag[last + 3 :])
+    assert not m.seen[last + 1 :].any()
+    assert all(flag.startswith("gone") for flag in m.flag[last + 1 :])
+
+
+@pytest.mark.parametrize("start", [(-1.7928, 0.029293, 0.025831, -0.8413), (2.4, -0.01, 0.04, 0.3)])
+@pytest.mark.parametrize("fps", [25, 60, 240])
+def test_a_falling_disk_is_gone_from_its_first_frame_on(fps: int, start: tuple[float, ...]) -> None:
+    with pytest.warns(IncompleteWarning, match="left the wheels"):
+        run = udd.simulate(udd.Disk(0.039), np.arange(0, 30, 0.005), start, dense=True)
+    end, random = float(run.t[-1]), np.random.default_rng(1)
+    falling = then_falling(motion_of(run), end)
+    for phase in (0.1, 0.5, 0.9):  # of the last frame before the disk is lost, and what of it is seen then
+        for shown in (fps // 12, fps // 8, fps):
+            t = np.arange(-2.0 + (phase - 1) / fps, (12.0 - phase) / fps, 1 / fps) + end
+            on = t <= end
+            values = falling(t)[:, 1:] + random.normal(0, 2e-5, (len(t), 3))
+            values[np.flatnonzero(~on)[shown:]] = np.nan
+            gone = left_the_wheels(t, values, 0.08, 1e-5, 0.039j)
+            assert gone[~on].all() and gone[on].sum() <= 1
+            assert not left_the_wheels(t[on], values[on], 0.08, 1e-5, 0.039j).any()
 
 
 def test_dropped_repeated_and_black_frames(tmp_path: Path) -> None:

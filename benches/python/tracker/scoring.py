@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from udd.film import Film
 
 WRONG = (2e-3, 2e-3, 0.1)  # m, m, rad: an error beyond is wrong unless the frame is flagged
-SAID_WITHIN = 2  # frames after which it must be said that the disk has gone
+SAID_WITHIN = 0  # frames after which it must be said that the disk has gone
 Array = NDArray[np.float64]
 
 

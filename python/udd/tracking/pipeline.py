@@ -359,7 +359,7 @@ def _to_metres(
     alike = common_mode_errors(tracks, add_shared_errors(own, 0.0, disk.shared), camera)
     shared = [*disk.shared, *(alike[:, None] * np.eye(3)[axis] for axis in (0, 1))]  # u and v: two causes
     values, sigma, rho = metres(tracks, add_shared_errors(own, centre_sigma, shared), camera)
-    gone = left_the_wheels(tracks.t, values, options.disk_radius, camera.pivot_sigma)
+    gone = left_the_wheels(tracks.t, values, options.disk_radius, camera.pivot_sigma, camera.drive)
     # by how much the centre is off that was said, all frames are: that makes none of them vague
     spread = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2
     vague = ~gone & (spread > (UNSURE * options.disk_radius) ** 2)

@@ -13,11 +13,18 @@ from udd.measurement import Measurement
 from udd.tracking.geometry.lens import PLAIN, Lens
 from udd.tracking.passes.tracks import Tracks
 
+from .apparent_gravity import STANDARD as GRAVITY
+
 Array = NDArray[np.float64]
 OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
 NEAR_EDGE = 0.8  # of the radius; a disk that was last seen farther in is lost, not gone
 LEAP = 3.0  # times as fast as nearly all the time; a disk near its edge that moves so has been let go
 FAR = 0.02  # of the radius, that a leap goes at least
+CLOSE = 2.5  # usual intervals: over a longer step nobody knows how the disk turned
+FEWEST = 20  # steps that show how far they usually are from rolling
+UNSEEN = 3  # frames without the disk at the end of a film
+ODD = 8.0  # times the usual misfit of a step
+ALIKE = 0.8  # cosine of the angle between two steps' misfits that point the same way
 LONG = 1.0  # s: over a longer gap the rate may have done anything
 
 
@@ -110,12 +117,28 @@ def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     return values, sigma, np.clip(rho, -0.999999, 0.999999)
 
 
-def left_the_wheels(t: Array, values: Array, radius: float, pivot_sigma: float) -> NDArray[np.bool_]:
-    """Frames from the one on in which the disk is tracked no more.
+def left_the_wheels(
+    t: Array, values: Array, radius: float, pivot_sigma: float, drive: complex = complex(np.nan, np.nan)
+) -> NDArray[np.bool_]:
+    """Find the frames after the disk has lost contact with the wheels.
 
-    The contact lies outside of it then, or leaps: of a disk that rolls d(Y^2 + Z^2)/dT = 2 W Z, so that its
-    distance changes no faster than the wheels turn. Also those after the last in which the disk was seen,
-    where the contact was near its edge.
+    The contact lies outside of the disk then, or its distance from the centre leaps, or the disk falls: see
+    `_release`. The frames after the last one with a pose count as well, if the contact was near the edge.
+
+    Parameters
+    ----------
+    t : ndarray (n,)
+        Times [s].
+    values : ndarray (n, 3)
+        Y, Z [m] and beta [rad]; NaN if the disk was not tracked.
+    radius, pivot_sigma : float
+        Radius of the disk and standard error of the contact [m].
+    drive : complex
+        Velocity of the driven material, Y + iZ [m/s]; NaN if it is not known.
+
+    Returns
+    -------
+    ndarray of bool (n,)
     """
     gone = np.zeros(len(values), dtype=bool)
     away = np.hypot(values[:, 0], values[:, 1])
@@ -125,11 +148,45 @@ def left_the_wheels(t: Array, values: Array, radius: float, pivot_sigma: float) 
         change, time = np.abs(np.diff(away[seen])), np.diff(t[seen])
         most = np.maximum(LEAP * float(np.quantile(change / time, 0.95)) * time, FAR * radius)
         outside[seen[1:]] |= (away[seen[:-1]] > NEAR_EDGE * radius) & (change > most)
+        if np.isfinite(drive):
+            unseen_after = len(away) - seen[-1] > UNSEEN
+            outside |= t > _release(t[seen], values[seen], radius, drive, unseen_after)
     if outside.any():
         gone[np.argmax(outside) :] = True
-    elif len(seen) and away[seen[-1]] > NEAR_EDGE * radius and len(away) - seen[-1] > 3:
+    elif len(seen) and away[seen[-1]] > NEAR_EDGE * radius and len(away) - seen[-1] > UNSEEN:
         gone[seen[-1] + 1 :] = True
     return gone
+
+
+def _release(t: Array, values: Array, radius: float, drive: complex, unseen_after: bool) -> float:
+    """Return the time at which the wheels lose the disk [s]; infinity if they do not.
+
+    In a step, a disk that rolls goes from a to (a + d (exp(i turn) - 1) dt / (i turn)) exp(-i turn); d is the
+    drive. A falling disk misses this by a velocity that grows with time. The release is where two steps in a
+    row miss the same way, by far more than usual, the second by as much more as gravity makes it; the first
+    one must be near the edge, and its miss says how long the disk has been falling. With `unseen_after`, the
+    disk is not seen after the last step, which counts alone.
+    """
+    at, turn, step = values[:, 0] + 1j * values[:, 1], np.diff(values[:, 2]), np.diff(t)
+    swept = drive * step * np.exp(0.5j * turn) * np.sinc(turn / (2 * np.pi))
+    off = at[1:] - (at[:-1] + swept) * np.exp(-1j * turn)
+    close = step < CLOSE * float(np.median(step))
+    if close.sum() < FEWEST:
+        return float("inf")
+    usual = float(np.median(np.abs(off[close])))
+    # gravity bends the path of a falling disk, rolling that of the other
+    rate = turn / step
+    bend = np.abs(-1j * GRAVITY + rate**2 * at[:-1] + 1j * rate * drive)
+    first, then = np.abs(off[:-1]), np.abs(off[1:])
+    alike = (off[:-1].conj() * off[1:]).real > ALIKE * first * then
+    most, more = ODD * usual, (bend * step**2)[:-1]
+    falls = (first > most) & (then > most) & alike & (np.abs(then - first - more) < 0.5 * more + most)
+    falls = np.append(falls & close[1:], unseen_after and abs(off[-1]) > most)
+    falls &= close & (np.abs(at[:-1]) > NEAR_EDGE * radius)
+    if not falls.any():
+        return float("inf")
+    k = int(np.argmax(falls))
+    return float(t[k] + 0.5 * step[k] - (abs(off[k]) + 2 * usual) / step[k] / bend[k])
 
 
 def recount(t: Array, angle: Array) -> tuple[Array, int]:
