@@ -153,7 +153,8 @@ def test_layouts_that_cannot_be(said: Any, why: str) -> None:
         ({"region": [0, 0, 5]}, "region must be four numbers"),
         ({"region": [9, 0, 5, 8]}, "growing"),
         ({"scale": 0}, "scale must be a positive number of pixels per metre, not 0"),
-        ({"bob": "grey"}, "bob must be one of red"),
+        ({"bob": "pink"}, "bob must be one of red"),
+        ({"bob": ["red", "red"]}, "two bobs need two colours"),
     ],
 )
 def test_settings_that_cannot_be(said: dict[str, Any], why: str) -> None:

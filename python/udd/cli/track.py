@@ -79,7 +79,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--bob",
         metavar="COLOUR",
-        help="the film is one of a plain pendulum with a bob of this colour (or codes: 150,105,65)",
+        help="the film is one of a pendulum, its bob of this colour (or codes 150,105,65; two bobs red,blue)",
     )
     parser.add_argument("--length", type=float, metavar="M", help="with --bob: from the pivot to the bob [m]")
     parser.add_argument(
@@ -303,17 +303,20 @@ def _rates(said: str | None) -> Any:
     return rates if len(rates) > 1 else rates[0][1]
 
 
-def _bob(colour: str) -> str | list[int]:
-    """A colour's name, or sRGB codes like 150,105,65."""
-    from udd.markers.layout import NAMED
+def _bob(said: str) -> Any:
+    """Read a colour's name, codes like 150,105,65, or the names of two colours like red,blue."""
+    from udd.markers.layout import NAMED, PALE
 
-    if colour in NAMED:
-        return colour
+    names = said.split(",")
+    if len(names) <= 2 and all(name in NAMED | PALE for name in names):
+        return names if len(names) == 2 else said
     try:
-        return [int(code) for code in colour.split(",", 2)]
+        return [int(code) for code in said.split(",", 2)]
     except ValueError:
-        names = ", ".join(NAMED)
-        raise UddError(f"--bob must be one of {names}, or codes like 150,105,65, not {colour}") from None
+        known = ", ".join(NAMED | PALE)
+        raise UddError(
+            f"--bob must be one of {known}, two of them (red,blue), or codes like 150,105,65, not {said}"
+        ) from None
 
 
 def _calibrate(said: str) -> dict[str, Any]:

@@ -23,6 +23,14 @@ NAMED = {
     "purple": (112, 48, 160),
     "magenta": (200, 40, 150),
 }
+#: Colours of bobs only: brightness must help to distinguish them.
+PALE = {
+    "black": (24, 24, 26),
+    "grey": (128, 128, 128),
+    "white": (235, 235, 230),
+    "wood": (150, 105, 65),
+    "brass": (181, 148, 72),
+}
 PALEST = 12.0  # of 127: chroma of a mark below which it is grey
 SAME = 0.985  # cosine between two colours' directions above which they are one
 SLACK = 0.12  # of the arm by which a mark may miss its place
@@ -111,13 +119,13 @@ def read_place(at: Any, number: int) -> complex:
     return place
 
 
-def _colour(said: Any, what: str) -> tuple[int, int, int]:
+def _colour(said: Any, what: str, named: Mapping[str, tuple[int, int, int]] = NAMED) -> tuple[int, int, int]:
     if isinstance(said, str):
-        if said not in NAMED:
+        if said not in named:
             raise TrackError(
-                f"{what} must be one of {', '.join(NAMED)} or three codes [r, g, b], not {said!r}"
+                f"{what} must be one of {', '.join(named)} or three codes [r, g, b], not {said!r}"
             )
-        return NAMED[said]
+        return named[said]
     try:
         red, green, blue = (int(c) for c in said)
     except (TypeError, ValueError):
@@ -127,12 +135,24 @@ def _colour(said: Any, what: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def read_bob(colour: Any) -> Layout:
-    """The one mark of a plain pendulum, by its colour's name or sRGB codes."""
-    layout = Layout((1 + 0j,), (_colour(colour, "bob"),))
-    if float(np.hypot(*layout.chroma[0])) < PALEST:
-        raise TrackError("bob must have a colour: grey, black and white cannot be told from the rest")
-    return layout
+def read_bob(said: Any) -> Layout:
+    """Read the colour of a pendulum's bob, or of the upper and the lower one of a double pendulum.
+
+    Parameters
+    ----------
+    said : str, sequence of three int, or sequence of two such
+        Names of `NAMED` or `PALE`, or sRGB codes.
+
+    Raises
+    ------
+    TrackError
+        No such name, or codes outside of 0 to 255.
+    """
+    two = isinstance(said, Sequence) and not isinstance(said, str) and len(said) == 2
+    colours = tuple(_colour(each, "bob", NAMED | PALE) for each in (said if two else (said,)))
+    if two and colours[0] == colours[1]:
+        raise TrackError(f"bob: two bobs need two colours, not {said[0]!r} twice")
+    return Layout(tuple(complex(k + 1) for k in range(len(colours))), colours)
 
 
 def _check(layout: Layout) -> None:

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from udd.calibration_items import unit_of
 from udd.errors import UddError
 from udd.models import profile_of
-from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, scale, tidy
+from udd.plot.style import AFTER, AXES, BEFORE, CHANNELS, FAINT, MEASURED, label, tidy
 
 from . import wording
 from .document import (
@@ -289,9 +289,9 @@ def motion(m: Measurement) -> Image:
     """The coordinates over time."""
     figure, grid = blank(9.0, 1.5 * len(m.names) + 0.7, rows=len(m.names))
     for k, ((ax,), name) in enumerate(zip(grid, m.names, strict=True)):
-        ax.plot(m.t, scale(name) * np.where(m.seen, m.values[:, k], np.nan), ".-", color=MEASURED,
+        said, unit, factor = AXES.get(name, (name, "mrad", 1e3))  # th1, th2 of two bobs
+        ax.plot(m.t, factor * np.where(m.seen, m.values[:, k], np.nan), ".-", color=MEASURED,
                 markersize=2, linewidth=0.5)  # fmt: skip
-        said, unit, _ = AXES[name]
         ax.set_ylabel(f"{_SHORT.get(name, said)} [{unit}]")
         _strips(ax, m)
         tidy(ax)

@@ -80,7 +80,7 @@ def track(
     layout: Layout | Sequence[Mapping[str, Any]] | None = None,
     scale: float | None = None,
     calibrate: Calibrate | Mapping[str, bool | float] | None = None,
-    bob: str | Sequence[int] | None = None,
+    bob: str | Sequence[int] | Sequence[str | Sequence[int]] | None = None,
     config: Config | TrackOptions | None = None,
     progress: bool | Callable[[str], object] | None = None,
     **more: Unpack[MoreOptions],
@@ -111,9 +111,10 @@ def track(
     calibrate : mapping, optional
         What the film is asked for: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: found (so
         if not given); False: as given, or not there; a number (lens, readout [s], exposure [s]): just that.
-    bob : str or (r, g, b), optional
+    bob : str, (r, g, b) or two of these, optional
         The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
-        picture's vertical, about the centre of the bob's path (or `pivot`).
+        picture's vertical, about the centre of the bob's path (or `pivot`). Two colours, the upper bob
+        first: a double pendulum, ``th1`` and ``th2`` from the vertical.
     config : path, mapping or TrackOptions, optional
         A TOML file (or what would stand in one) with any of these arguments; what is given here wins.
     progress : bool or callable, optional

@@ -69,7 +69,7 @@ def pixels(m: Measurement) -> Pixels:
     KeyError
         The measurement does not come from a film.
     """
-    if m.kind == "pendulum":
+    if "length_px" in m.meta:
         return _of_pendulum(m)
     scale = float(m.meta["px_per_m"])
     pivot = complex(float(m.meta["pivot_u"]), float(m.meta["pivot_v"]))
@@ -92,17 +92,20 @@ def pixels(m: Measurement) -> Pixels:
 
 
 def _of_pendulum(m: Measurement) -> Pixels:
-    """The bob as a disk whose one mark is its middle."""
+    """Return the first bob as a disk; the marks are the middles of the bobs."""
     pivot = np.array([float(m.meta["pivot_u"]), float(m.meta["pivot_v"])])
-    long, radius, theta = float(m.meta["length_px"]), float(m.meta["bob_px"]), m["theta"]
+    long, radius, theta = float(m.meta["length_px"]), float(m.meta["bob_px"]), m.values[:, 0]
     centre = pivot + long * np.column_stack([np.sin(theta), np.cos(theta)])
+    bobs = [centre]
+    if "lower_length_px" in m.meta:
+        lower = m.values[:, 1]
+        arm = np.column_stack([np.sin(lower), np.cos(lower)])
+        bobs.append(centre + float(m.meta["lower_length_px"]) * arm)
     ring = 2 * np.pi * np.arange(73) / 72
     rim = centre[:, None] + radius * np.column_stack([np.cos(ring), np.sin(ring)])
-    (red, green, blue), *_ = m.meta["marks_rgb"]
+    colours = tuple((int(red), int(green), int(blue)) for red, green, blue in m.meta["marks_rgb"])
     scale = float(m.meta["px_per_m"] or np.nan)
-    return Pixels(
-        centre, theta, centre[:, None], rim, radius, pivot, scale, ((int(red), int(green), int(blue)),)
-    )
+    return Pixels(centre, theta, np.stack(bobs, axis=1), rim, radius, pivot, scale, colours)
 
 
 def metres(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Array, Array]:

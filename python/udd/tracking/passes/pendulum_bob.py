@@ -13,37 +13,29 @@ from numpy.typing import NDArray
 from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.correction import applied
+from udd.tracking.detection.bob import Background, Blob, BobColour, bob_colour, locate_bob, usual_area
 from udd.tracking.detection.camera_motion import CameraMotion, steadied
-from udd.tracking.detection.colour_blobs import blobs
 from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, is_copy, lost
 from udd.tracking.detection.survey import survey
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
-from udd.video.srgb import light_of
 
+from .double_pendulum import with_lower_bob
 from .frame_quality import remarks
 from .inserted_copies import inserted_copies
 
 Array = NDArray[np.float64]
-STRONG = 14.0  # of 127: how much more of its colour than the background a bob has
-SMALL = 12  # pixels of colour that are no bob
-SHARE = 0.4  # of its colour and light from which on a pixel counts as the bob's
 HALF_HIDDEN = 0.93  # share of the size in the last frames below which the middle is not the bob's
 TOO_MUCH = 1.15  # and above which something else of its colour is there
 LEAST, MOST = 0.87, 1.2  # the same of the size in the whole film
 RECENT = 5  # frames
 ROUND = 0.03  # of the radius: a path that is off by more is no circle
+WANDERS = 0.003  # of the radius: nor is one with so different distances in one direction ...
+SCATTERS = 4.0  # ... if that is so many times the frames' own scatter
+BENDS = 6  # degree of the polynomial by which lens and tilt change the distance
+FEWEST = 10  # frames that show the bob
 MOVED = 3.0  # pixels: a bob that was to move by less may look like a copy
 SURE = 0.02  # of the length by which the pivot may be unsure
-
-
-@dataclass(frozen=True)
-class Blob:
-    """The bob in one picture: middle, size and second moments [pixels]."""
-
-    centre: complex
-    area: float
-    moments: Array  # (2, 2)
 
 
 @dataclass(frozen=True)
@@ -57,37 +49,56 @@ class Circle:
 
 
 def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], object]) -> Measurement:
-    """The pendulum's angle in each frame; the options' layout is the bob's colour.
+    """Measure the pendulum's angle in each frame; the options' layout holds the colours of one bob or two.
 
     Raises
     ------
     TrackError
-        No bob of that colour moves in the film, or its path is too short an arc to tell the pivot.
+        No bob of that colour moves in the film, or its path does not show the pivot.
     """
     look_over, camera = steadied(film, survey(film))
     some = [burst[0] for burst in look_over.bursts if not burst[0].damaged]
-    behind, noise = _background(some)
-    rows: list[tuple[float, str, Blob | None]] = []
-    size = _size(film, some, behind, options)
-    last: NDArray[np.uint8] | None = None
-    path: list[complex] = []
-    areas: deque[float | None] = deque(maxlen=RECENT)  # of the last frames; None: not seen
+    behind = Background.of(some, options.view(some[0].y.shape), film.full_range)
+    bobs = []
+    for rgb, chroma in zip(options.layout.colours, options.layout.chroma, strict=True):
+        colour = bob_colour(film, some, behind, BobColour.of(rgb, chroma, film.full_range))
+        bobs.append(BobTracker(behind, colour, usual_area(film, some, behind, colour)))
     for picture in film.pictures():
         tick(picture)
-        blob, flag = None, _flag(picture, behind)
+        for bob in bobs:
+            bob.follow(picture)
+    first = bob_path(film, bobs[0], options)
+    if len(bobs) == 1:
+        return _pendulum(film, first, options, behind.grain, camera)
+    upper, lower = _pendulum(film, first, options, behind.grain, camera), bob_path(film, bobs[1], options)
+    return _checked(film, with_lower_bob(upper, first.at, lower.at, lower.usual_area, str(film.path)))
+
+
+class BobTracker:
+    """One bob, followed from picture to picture."""
+
+    def __init__(self, behind: Background, colour: BobColour, size: float) -> None:
+        self.behind, self.colour, self.size = behind, colour, size
+        self.rows: list[tuple[float, str, Blob | None]] = []
+        self._last: NDArray[np.uint8] | None = None
+        self._path: list[complex] = []
+        self._areas: deque[float | None] = deque(maxlen=RECENT)  # of the last frames; None: not seen
+
+    def follow(self, picture: Picture) -> None:
+        """Find the bob in the next picture."""
+        blob, flag = None, _flag(picture, self.behind.picture)
         if not flag:
-            blob = locate_bob(picture, behind, options, None, film.full_range)
-            if blob is not None and not _whole(blob.area, size, areas):
+            blob = locate_bob(picture, self.behind, self.colour)
+            if blob is not None and not _whole(blob.area, self.size, self._areas):
                 blob = None
-            areas.append(None if blob is None else blob.area)
+            self._areas.append(None if blob is None else blob.area)
             flag = "" if blob is not None else lost("the bob is not seen, or partly hidden")
-        if blob is not None and last is not None and _copy(picture.y, last, blob, path):
+        if blob is not None and self._last is not None and _copy(picture.y, self._last, blob, self._path):
             blob, flag = None, REPEATED
         if blob is not None:
-            path = [*path[-2:], blob.centre]
-        rows.append((picture.t, flag, blob))
-        last = picture.y
-    return _angles(film, rows, options, noise, camera)
+            self._path = [*self._path[-2:], blob.centre]
+        self.rows.append((picture.t, flag, blob))
+        self._last = picture.y
 
 
 def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
@@ -97,97 +108,12 @@ def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
     return LEAST * size < area < MOST * size and HALF_HIDDEN * usual < area < TOO_MUCH * usual
 
 
-def _background(some: Sequence[Picture]) -> tuple[Picture, float]:
-    """What stands still: the median of pictures all over the film; and the grain about it [codes]."""
-    planes = [np.stack([getattr(p, name) for p in some]) for name in ("y", "u", "v")]
-    middle = [np.median(x, axis=0).astype(np.uint8) for x in planes]
-    grain = np.abs(planes[0][:, ::4, ::4].astype(np.int16) - middle[0][::4, ::4])
-    return Picture(0, 0.0, *middle), float(1.48 * np.median(grain[grain > 0])) if (grain > 0).any() else 1.0
-
-
 def _flag(picture: Picture, behind: Picture) -> str:
     if picture.damaged:
         return DAMAGED
     some, usual = picture.y[::8, ::8], behind.y[::8, ::8].astype(np.int16)
     black = float(some.std()) < BLANK and float(np.abs(some - usual).mean()) > BLANK
     return BLACK if black else ""
-
-
-def _more(picture: Picture, behind: Picture, options: TrackOptions) -> NDArray[np.float32]:
-    """How much more of the colour than the background has each pixel, at half the resolution."""
-    chroma = options.layout.chroma[0]
-    a, b = (chroma / np.hypot(*chroma)).astype(np.float32)
-    du, dv = picture.u.astype(np.float32) - behind.u, picture.v.astype(np.float32) - behind.v
-    inside = options.view(picture.y.shape)[::2, ::2][: du.shape[0], : du.shape[1]]
-    return np.where(inside, a * du + b * dv, np.float32(0))
-
-
-def _size(film: Film, some: Sequence[Picture], behind: Picture, options: TrackOptions) -> float:
-    """The bob's usual area [pixels]."""
-    blobs_seen = [locate_bob(p, behind, options, None, film.full_range) for p in some]
-    areas = [blob.area for blob in blobs_seen if blob is not None]
-    if len(areas) < 5:
-        raise TrackError(f"{film.path}: no bob of that colour moves in this film")
-    return float(np.median(areas))
-
-
-def locate_bob(
-    picture: Picture, behind: Picture, options: TrackOptions, size: float | None, full_range: bool = False
-) -> Blob | None:
-    """The middle of the largest patch that has the colour, weighted by how much of each pixel is the bob's.
-
-    A pixel's share is the part of the way from the background's light to the bob's, in three colours. A patch
-    that is not of the usual `size` is hidden in part, or not the bob alone.
-    """
-    import cv2
-
-    more = _more(picture, behind, options)
-    found = blobs(more > STRONG, SMALL // 4, 1)
-    if not len(found.centre):
-        return None
-    middle, reach = complex(found.centre[0]), 0.5 * np.sqrt(found.area[0]) * 1.6 + 8
-    r0, r1 = max(0, int(middle.imag - reach)) & ~1, min(picture.y.shape[0], int(middle.imag + reach) + 1)
-    c0, c1 = max(0, int(middle.real - reach)) & ~1, min(picture.y.shape[1], int(middle.real + reach) + 1)
-    shape, half = (r1 - r0, c1 - c0), (slice(r0 // 2, (r1 + 1) // 2), slice(c0 // 2, (c1 + 1) // 2))
-    change = _light(picture, (r0, r1, c0, c1), full_range) - _light(behind, (r0, r1, c0, c1), full_range)
-    solid = cv2.resize(
-        (more[half] > 2 * STRONG).astype(np.uint8), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST
-    )[: shape[0], : shape[1]]
-    if solid.sum() < SMALL:
-        return None
-    full = np.median(change[solid > 0], axis=0)
-    share = np.clip(change @ full / float(full @ full), 0, 1.1)
-    near = cv2.dilate((share > SHARE).astype(np.uint8) & cv2.dilate(solid, np.ones((3, 3), np.uint8)),
-                      np.ones((7, 7), np.uint8))  # fmt: skip
-    weight = np.where(near > 0, share, 0).astype(np.float64)
-    area = float(weight.sum())
-    if size is not None and not HALF_HIDDEN * size < area < TOO_MUCH * size:
-        return None
-    v, u = np.mgrid[r0:r1, c0:c1]
-    cu, cv = (weight * u).sum() / area, (weight * v).sum() / area
-    uu, vv = (weight * (u - cu) ** 2).sum() / area, (weight * (v - cv) ** 2).sum() / area
-    uv = (weight * (u - cu) * (v - cv)).sum() / area
-    return Blob(complex(cu, cv), area, np.array([[uu, uv], [uv, vv]]))
-
-
-def _light(picture: Picture, box: tuple[int, int, int, int], full_range: bool) -> NDArray[np.float32]:
-    """Red, green and blue light of a part of a picture, (rows, columns, 3), which a shutter adds up."""
-    import cv2
-
-    r0, r1, c0, c1 = box
-    half = slice(r0 // 2, (r1 + 1) // 2), slice(c0 // 2, (c1 + 1) // 2)
-    y = picture.y[r0:r1, c0:c1].astype(np.float32)
-    u, v = (
-        cv2.resize(p[half].astype(np.float32) - 128, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
-        for p in (picture.u, picture.v)
-    )
-    u, v = u[: r1 - r0, : c1 - c0], v[: r1 - r0, : c1 - c0]
-    if not full_range:
-        y, u, v = (y - 16) * (255 / 219), u * (255 / 224), v * (255 / 224)
-    codes = np.stack([y + 1.402 * v, y - 0.344 * u - 0.714 * v, y + 1.772 * u], axis=-1) / 255
-    codes = np.clip(codes, 0, 1)
-    light = light_of(codes)
-    return np.asarray(light, dtype=np.float32)
 
 
 def _copy(y: NDArray[np.uint8], last: NDArray[np.uint8], blob: Blob, path: Sequence[complex]) -> bool:
@@ -236,36 +162,82 @@ def _exposure(t: Array, at: NDArray[np.complex128], moments: Array) -> tuple[flo
     return float(np.sqrt(square)), 0.5 * sigma / float(np.sqrt(square))
 
 
-def _angles(
-    film: Film,
-    rows: list[tuple[float, str, Blob | None]],
-    options: TrackOptions,
-    noise: float,
-    camera: CameraMotion | None,
-) -> Measurement:
+@dataclass(frozen=True)
+class BobPath:
+    """A bob in all frames: times, flags, places in mid-exposure, areas [pixels], and the exposure."""
+
+    t: Array
+    flag: list[str]
+    at: NDArray[np.complex128]
+    area: Array
+    exposure: float  # [s]
+    exposure_sigma: float
+
+    @property
+    def usual_area(self) -> float:
+        """Median area [pixels] of the frames that show it."""
+        return float(np.median(self.area[np.isfinite(self.at)]))
+
+
+def bob_path(film: Film, bob: BobTracker, options: TrackOptions) -> BobPath:
+    """Return the path of a bob, and the exposure by which it is blurred.
+
+    Raises
+    ------
+    TrackError
+        The bob is seen in fewer than 10 frames.
+    """
+    rows = bob.rows
     t = np.array([row[0] for row in rows])
-    flag = [row[1] for row in rows]
     at = np.array([complex(np.nan, np.nan) if blob is None else blob.centre for *_, blob in rows])
     moments = np.array([np.full((2, 2), np.nan) if blob is None else blob.moments for *_, blob in rows])
     area = np.array([0.0 if blob is None else blob.area for *_, blob in rows])
     seen = np.isfinite(at)
-    if seen.sum() < 10:
-        raise TrackError(f"{film.path}: the bob is seen in {seen.sum()} frames, at least 10 are needed")
+    if seen.sum() < FEWEST:
+        raise TrackError(f"{film.path}: the bob is seen in {seen.sum()} frames, at least {FEWEST} are needed")
     given = options.calibrate.given("exposure")
     open_for, open_sigma = (given, 0.0) if given is not None else _exposure(t[seen], at[seen], moments[seen])
     at, _ = at_middle(t, at, np.zeros(len(t)), open_for)
+    return BobPath(t, [row[1] for row in rows], at, area, open_for, open_sigma)
+
+
+def _wandering(at: NDArray[np.complex128], path: Circle) -> float:
+    """Return by how much a bob comes by at different distances from the pivot in the same direction [pixels].
+
+    Lens and tilt change the distance with the direction only; the lower bob of a double pendulum has another
+    distance each time. Less than the frames' own scatter is 0.
+    """
+    direction = np.angle((at - path.centre) / (at.mean() - path.centre))
+    x = direction / max(float(np.abs(direction).max()), 1e-9)
+    rest = path.rest - np.polyval(np.polyfit(x, path.rest, BENDS), x)
+    scatter = 1.48 * float(np.median(np.abs(np.diff(path.rest, 4)))) / 70**0.5
+    off = 1.48 * float(np.median(np.abs(rest)))
+    return off if off > SCATTERS * scatter else 0.0
+
+
+def _pendulum(
+    film: Film, bob: BobPath, options: TrackOptions, noise: float, camera: CameraMotion | None
+) -> Measurement:
+    """Return the angle of a bob about the centre of its path."""
+    t, flag, at, area = bob.t, bob.flag, bob.at.copy(), bob.area
+    open_for, open_sigma, given = bob.exposure, bob.exposure_sigma, options.calibrate.given("exposure")
+    seen = np.isfinite(at)
     path = circle(at[seen])
     off = 1.48 * float(np.median(np.abs(path.rest - np.median(path.rest))))
-    if off > ROUND * path.radius:
+    wanders = _wandering(at[seen], path)
+    unsure = options.pivot is None and path.sigma[0] > SURE * path.radius
+    if off > ROUND * path.radius or wanders > (0.0 if unsure else WANDERS * path.radius):
+        off = max(off, wanders)
         raise TrackError(
             f"{film.path}: the bob's path is no circle ({off:.1f} pixels off one of {path.radius:.0f}): is "
-            "it the lower bob of a double pendulum, or are there several of that colour (then say region)?"
+            "it the lower bob of a double pendulum (then give both colours, the upper one first), or "
+            "are there several of that colour (then say region)?"
         )
     pivot, pivot_sigma, origin = path.centre, path.sigma[0], "circle of the bob"
     if options.pivot is not None:
         pivot, pivot_sigma, origin = complex(*options.pivot), 0.0, "given"
         radius = float(np.median(np.abs(at[seen] - pivot)))
-    elif path.sigma[0] > SURE * path.radius:
+    elif unsure:
         raise TrackError(
             f"{film.path}: the bob's path is too short an arc to tell where the pivot is: give pivot=(u, v)"
         )
@@ -283,7 +255,7 @@ def _angles(
     rest = np.abs(away) - radius
     sigma = np.where(seen, spread / radius, np.nan)
     rate = np.abs(np.gradient(np.where(seen, at, np.nan), t))
-    usual = float(np.median(area[seen]))
+    usual = bob.usual_area
     quality: dict[str, NDArray[Any]] = {
         "marks": seen.astype(np.int64),
         "complete": np.round(np.minimum(area / usual, 1.0), 4),
@@ -309,7 +281,7 @@ def _angles(
         "pivot_from": origin,
         "length_px": radius,
         "bob_px": float(np.sqrt(usual / np.pi)),
-        "marks_rgb": [list(options.layout.colours[0])],
+        "marks_rgb": [list(colour) for colour in options.layout.colours],
         "grain": noise,
         "calibration": {
             "pivot": [[pivot.real, pivot.imag], pivot_sigma, origin],
@@ -328,7 +300,10 @@ def _angles(
     else:
         meta["px_per_m"] = None
     flag = remarks(t, flag, quality, False)
-    m = Measurement(t, theta, sigma, None, np.array(flag), meta, PENDULUM, quality)
+    return _checked(film, Measurement(t, theta, sigma, None, np.array(flag), meta, PENDULUM, quality))
+
+
+def _checked(film: Film, m: Measurement) -> Measurement:
     try:
         check_length(m)
     except ValueError as error:

@@ -1,0 +1,70 @@
+"""Two bobs of a double pendulum: the angle of the upper one about the pivot, of the lower one about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd.measurement import Measurement
+from udd.video.reader import TrackError
+
+NAMES = ("th1", "th2")
+RIGID = 0.03  # of the distance of the bobs by which it may change
+
+
+def with_lower_bob(
+    upper: Measurement, first: NDArray[np.complex128], second: NDArray[np.complex128], area: float, name: str
+) -> Measurement:
+    """Add the angle of the lower bob to the measurement of the upper one.
+
+    Parameters
+    ----------
+    upper : Measurement
+        ``theta`` of the upper bob.
+    first, second : ndarray of complex (n,)
+        Places of the bobs [pixels, v down], NaN if not seen.
+    area : float
+        Of the lower bob [pixels].
+    name : str
+        Of the film, for messages.
+
+    Returns
+    -------
+    Measurement
+        ``th1, th2`` [rad, from the vertical], each with standard errors.
+
+    Raises
+    ------
+    TrackError
+        The bobs do not keep their distance.
+    """
+    seen = upper.seen & np.isfinite(second) & np.isfinite(first)
+    if seen.sum() < 10:
+        raise TrackError(f"{name}: both bobs are seen in {seen.sum()} frames only, at least 10 are needed")
+    arm = second - first
+    length = float(np.median(np.abs(arm[seen])))
+    off = np.abs(arm) - length
+    scatter = 1.48 * float(np.median(np.abs(off[seen])))
+    if scatter > RIGID * length:
+        raise TrackError(
+            f"{name}: the distance of the bobs changes by {scatter:.1f} of {length:.0f} pixels: are they the "
+            "two bobs of one double pendulum, the upper one named first?"
+        )
+    theta = np.full(len(second), np.nan)
+    theta[seen] = np.unwrap(np.arctan2(arm[seen].real, arm[seen].imag))
+    values = np.column_stack([upper["theta"], theta])
+    sigma = np.column_stack([upper["sigma_theta"], np.where(seen, max(scatter, 0.01) / length, np.nan)])
+    values[~seen] = sigma[~seen] = np.nan
+    flag = [
+        "lost: a bob is not seen, or partly hidden" if not ok and not said else said
+        for ok, said in zip(seen, upper.flag, strict=True)
+    ]
+    meta = {
+        **upper.meta,
+        "frames_lost": int((~seen).sum()),
+        "lower_length_px": length,
+        "lower_bob_px": float(np.sqrt(area / np.pi)),
+    }
+    return replace(upper, values=values, sigma=sigma, rho=None, flag=np.array(flag), meta=meta, names=NAMES)
