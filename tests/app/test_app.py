@@ -108,6 +108,18 @@ def test_the_table_holds_the_same_bits(client: TestClient) -> None:
     np.testing.assert_array_equal(table[:, 1:], whole.state[:481])
 
 
+def test_the_table_in_the_units_shown_is_read_back(client: TestClient, tmp_path: Path) -> None:
+    query = {"run": json.dumps(CHAOS), "seconds": 2, "units": "shown"}
+    text = client.get("/api/run.csv", params=query).text
+    assert "t [s],Omega [rad/s],Y [cm],Z [cm],beta [rad]" in text
+    assert "# W [cm/s] = 3\n# R [cm] = 8\n" in text
+    (tmp_path / "run.csv").write_text(text)
+    with pytest.warns(UserWarning, match="converted Y from cm to m, Z from cm to m"):
+        read = udd.read_measurement(tmp_path / "run.csv")
+    whole = udd.simulate(udd.Disk(0.03), np.arange(2000) / 240, CHAOS["state"], method="dopri5")
+    np.testing.assert_allclose(read.values, whole.state[:481, 1:], rtol=1e-9, atol=1e-12)
+
+
 # --- the WebSocket
 
 
@@ -348,7 +360,7 @@ def test_which_names_a_server_goes_by() -> None:
 
 
 def test_presets_run_and_have_words() -> None:
-    words = json.loads((STATIC / "texts.json").read_text())
+    words = json.loads((STATIC / "texts.en.json").read_text())
     offered = json.loads(json.dumps(catalogue(), allow_nan=False))
     for preset in offered["presets"]:
         assert f"preset_{preset['key']}" in words
@@ -372,8 +384,8 @@ def test_steadily_rotating_is_steady_and_bistable_has_two_attractors() -> None:
     assert len({label for label in found.label[:, 1] if label > 0}) >= 2
 
 
-def test_every_word_that_the_page_says_is_in_the_one_file() -> None:
-    words = json.loads((STATIC / "texts.json").read_text())
+def test_every_word_that_the_page_says_is_in_its_file() -> None:
+    words = json.loads((STATIC / "texts.en.json").read_text())
     page = (STATIC / "index.html").read_text()
     used = set(re.findall(r'data-(?:text|label|hint)="(\w+)"', page))
     script = "\n".join(path.read_text() for path in STATIC.glob("*.js"))
@@ -383,6 +395,22 @@ def test_every_word_that_the_page_says_is_in_the_one_file() -> None:
     beginnings = set(re.findall(r"\bt\(`(\w+?)\$\{", script))
     unused = {w for w in words if w not in used and f'"{w}"' not in script}
     assert {w for w in unused if not any(w.startswith(b) for b in beginnings)} == set()
+
+
+@pytest.mark.parametrize("language", ["nl", "de"])
+def test_a_language_is_complete(language: str) -> None:
+    english, other = (json.loads((STATIC / f"texts.{code}.json").read_text()) for code in ("en", language))
+    assert other.keys() == english.keys()
+    for key, text in english.items():
+        if isinstance(text, str):
+            # The same places for values, and no sentence left in English.
+            assert sorted(re.findall(r"{\w*}", other[key])) == sorted(re.findall(r"{\w*}", text)), key
+            words = re.findall(r"[a-z]{3,}", re.sub(r"{\w*}", "", text))
+            assert other[key] != text or len(words) < 3, key
+        else:
+            assert [len(row) for row in other[key]] == [len(row) for row in text], key
+    offered = re.search(r"LANGUAGES = {(.*)}", (STATIC / "texts.js").read_text())
+    assert offered is not None and f"{language}:" in offered[1]
 
 
 def test_the_page_reaches_for_nothing_outside() -> None:

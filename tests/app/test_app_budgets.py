@@ -71,7 +71,7 @@ def test_a_run_has_a_number_of_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     assert end["type"] == "end"
     assert end["outcome"] == "spent"
     assert 1.0 < end["t"] < 20.0
-    assert "ended_spent" in json.loads((STATIC / "texts.json").read_text())
+    assert "ended_spent" in json.loads((STATIC / "texts.en.json").read_text())
 
 
 def test_a_run_that_takes_too_long_ends_for_one_that_waits(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -17,11 +18,11 @@ from browser_for_tests import Opened
 collect_ignore_glob = [] if os.environ.get("UDD_BROWSER") else ["test_*.py"]
 
 
-@pytest.fixture(scope="session")
-def link() -> Iterator[str]:
-    """The address of a server of its own."""
+@contextlib.contextmanager
+def served(*options: str) -> Iterator[str]:
+    """The address of a server that is started for tests."""
     server = subprocess.Popen(
-        [sys.executable, "-m", "udd", "app", "--no-browser", "--port", "0"],
+        [sys.executable, "-m", "udd", "app", "--no-browser", "--port", "0", *options],
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -32,6 +33,20 @@ def link() -> Iterator[str]:
         server.terminate()
         server.wait(20)
         server.stdout.close()
+
+
+@pytest.fixture(scope="session")
+def link() -> Iterator[str]:
+    """The address of the page."""
+    with served() as address:
+        yield address
+
+
+@pytest.fixture(scope="session")
+def class_link() -> Iterator[str]:
+    """The address of the page of a class."""
+    with served("--classroom", "--host", "127.0.0.1") as address:
+        yield address
 
 
 @pytest.fixture(scope="session")

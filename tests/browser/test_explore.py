@@ -83,14 +83,19 @@ def test_what_is_exported_is_what_is_shown(opened: Opened, tmp_path: Path) -> No
     _, states = shown(page, 240)
     page.click("#export summary")
     with page.expect_download() as csv:
-        page.click("#export-csv")
+        page.click("#export-exact")
     lines = [line for line in Path(csv.value.path()).read_text().splitlines() if line[0] != "#"]
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
     np.testing.assert_array_equal(table[:240, 1:], states)
     page.click("#export summary")
     with page.expect_download() as picture:
         page.click("#export-png")
-    assert Path(picture.value.path()).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    content = Path(picture.value.path()).read_bytes()
+    assert content[:8] == b"\x89PNG\r\n\x1a\n"
+    assert int.from_bytes(content[16:20], "big") > 1.9 * page.locator("#stage").bounding_box()["width"]
+    said = page.evaluate("udd.describe()")
+    assert said.startswith("W = 3 cm/s, R = 8 cm, g = 9.81 m/s², ")
+    assert "start Ω = 0 rad/s, Y = 0.1 cm, Z = 4 cm, β = 0 rad, at " in said
     code = page.evaluate("import('/static/address.js').then((m) => m.python(udd.home, udd.catalogue))")
     made: dict[str, Any] = {}
     exec(code, made)
@@ -259,4 +264,5 @@ def test_two_pages_of_json(opened: Opened) -> None:
     from udd.app.presets import catalogue
 
     page = opened.go()
-    assert page.evaluate("udd.catalogue") == json.loads(json.dumps(catalogue()))
+    offered = json.loads(json.dumps(catalogue()))
+    assert page.evaluate("udd.catalogue") == {**offered, "classroom": False}

@@ -12,7 +12,7 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("screen", ["section", "diagram", "energy", "film", "keys", "projector"])
+@pytest.mark.parametrize("screen", ["section", "diagram", "energy", "series", "film", "keys", "projector"])
 def test_a_screen(browser: Any, link: str, size: str, screen: str) -> None:
     one = Opened(browser, link, size)
     page = one.go(f"#model=disk&W=0.03&state=0,0.001,0.04,0&tab={screen}" if len(screen) > 5 else "")

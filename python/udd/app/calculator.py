@@ -7,6 +7,7 @@ is the length of a pickle, then the pickle. Both come from this package alone, n
 
 from __future__ import annotations
 
+import importlib
 import os
 import pickle
 import queue
@@ -20,6 +21,7 @@ from . import child_process
 from .interruption import Interruptible, StoppedError
 
 LENGTH = struct.Struct("<Q")
+_NEEDED = ("growing_run", "maps")
 
 
 def main() -> None:
@@ -27,6 +29,8 @@ def main() -> None:
     source, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     child_process.limit()
+    for module in _NEEDED:  # before the first question, which would wait for them
+        importlib.import_module(f"{__package__}.{module}")
     work = Interruptible()
     questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(source, work, questions), daemon=True).start()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import pickle
 import sys
 from collections.abc import AsyncIterator, Callable
@@ -18,14 +19,18 @@ from udd.errors import UddError
 from . import limits
 from .calculator import LENGTH
 from .interruption import SpentError, StoppedError
+from .shared_answers import SharedAnswers
 
 _GRACE = 0.5  # s in which a process must have stopped its work
 _LOOK_EVERY = 0.1  # s between two looks whether a question that waits may push another out
-_IDLE = 2  # processes kept for the next question
+_LONG = 0.5  # s that a question runs before another process is started for those that wait
 
 
 class Calculators:
     """Processes for questions of one kind.
+
+    As many as there are cores answer in turn. Further ones, up to the budget, start only if all of these have
+    been at their questions for long: each costs the time of an import.
 
     Parameters
     ----------
@@ -35,12 +40,17 @@ class Calculators:
 
     def __init__(self, budget: limits.Budget) -> None:
         self._budget = budget
-        self._slots = asyncio.Semaphore(budget.processes)
+        self._usual = min(budget.processes, os.cpu_count() or 1)
+        self._allowed = self._usual
+        self._slots = asyncio.Semaphore(self._usual)
         self._idle: list[_Calculator] = []
         self._busy: set[_Calculator] = set()
+        self._answers = SharedAnswers(limits.KEPT)
 
     async def ask(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Return what a function of this package returns in another process.
+
+        Equal questions share one computation, and its answer as long as there is room for it.
 
         Parameters
         ----------
@@ -56,6 +66,11 @@ class Calculators:
         UddError
             What the function raised; or the process ended.
         """
+        key = pickle.dumps((function, arguments))
+        return await self._answers.of(key, lambda: self._computed(function, arguments))
+
+    async def _computed(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, int]:
+        """Return the answer and how many bytes it has."""
         async with self._slot():
             calculator = self._idle.pop() if self._idle else _Calculator()
             self._busy.add(calculator)
@@ -63,7 +78,7 @@ class Calculators:
                 answer = await calculator.ask((self._budget.seconds, function, arguments))
             finally:
                 self._busy.discard(calculator)
-                if calculator.ready and len(self._idle) < _IDLE:
+                if calculator.ready and len(self._idle) < self._usual:
                     self._idle.append(calculator)
                 else:
                     calculator.kill()
@@ -73,7 +88,7 @@ class Calculators:
             )
         if isinstance(answer, Exception):
             raise answer
-        return answer
+        return answer, calculator.size
 
     async def prepare(self) -> None:
         """Start a process for the first question."""
@@ -90,24 +105,38 @@ class Calculators:
 
     @contextlib.asynccontextmanager
     async def _slot(self) -> AsyncIterator[None]:
-        """Wait for a turn; whoever waits stops the question that has run longest, once it had its share."""
+        """Wait for a turn, in the order of the questions."""
         turn = asyncio.ensure_future(self._slots.acquire())
         try:
             while not (await asyncio.wait({turn}, timeout=_LOOK_EVERY))[0]:
-                self._push_out()
+                self._make_room()
         except asyncio.CancelledError:
             if not turn.cancel():
-                self._slots.release()
+                self._release()
             raise
         try:
             yield
         finally:
-            self._slots.release()
+            self._release()
 
-    def _push_out(self) -> None:
+    def _make_room(self) -> None:
+        """Allow another process if all are at long questions, or stop the longest once it had its share."""
+        ages = [calculator.age for calculator in self._busy]
+        if len(ages) < self._allowed or min(ages) < _LONG:
+            return
+        if self._allowed < self._budget.processes:
+            self._allowed += 1
+            self._slots.release()
+            return
         oldest = min((c for c in self._busy if not c.stopping), key=lambda c: c.began, default=None)
         if oldest is not None and oldest.age > self._budget.share:
             oldest.stop()
+
+    def _release(self) -> None:
+        if self._allowed > self._usual:
+            self._allowed -= 1
+        else:
+            self._slots.release()
 
 
 class _Calculator:
@@ -119,6 +148,8 @@ class _Calculator:
         self._killed = False
         self.began = 0.0
         self.stopping = False
+        self.size = 0
+        """Bytes of its last answer."""
         self.ready = False
         """Whether it can take another question."""
 
@@ -172,6 +203,7 @@ class _Calculator:
             self._say(question)
             (size,) = LENGTH.unpack(await self._process.stdout.readexactly(LENGTH.size))
             answer = pickle.loads(await self._process.stdout.readexactly(size))
+            self.size = size
         except (OSError, EOFError):
             if self.stopping:
                 return StoppedError("the process was ended")

@@ -171,8 +171,18 @@ class Runs:
         return self._kept[key]
 
 
-def as_csv(start: Start, seconds: float) -> str:
-    """The states that the page shows, with enough digits to be the same bits.
+def as_csv(start: Start, seconds: float, shown: bool = False) -> str:
+    """Write the states that the page shows as a table.
+
+    Parameters
+    ----------
+    start : Start
+        The model and where the run begins.
+    seconds : float
+        How long the run is on the page.
+    shown : bool
+        Write them in the units that the page shows, to ten digits, with these units in the headings. Without
+        it they are in SI units, with enough digits to be the same bits.
 
     Raises
     ------
@@ -184,7 +194,34 @@ def as_csv(start: Start, seconds: float) -> str:
     run = Run(start)
     rows, _ = run.piece(0, round(seconds * RATE) + 1)
     names = start.model.state_names
-    lines = [f"# model = {start.model!r}", f"# outcome = {run.outcome}", ",".join(("t", *names))]
+    lines = [f"# model = {start.model!r}", f"# outcome = {run.outcome}"]
     table = np.column_stack([run.t[: len(rows)], rows[:, : len(names)]])
-    lines += [",".join(map(repr, row)) for row in table.tolist()]
+    if not shown:
+        lines += [",".join(("t", *names)), *(",".join(map(repr, row)) for row in table.tolist())]
+        return "\n".join(lines) + "\n"
+    units = [("s" if start.model.kind == "disk" else "", 1.0)]
+    units += [_SHOWN.get(unit, (unit, 1.0)) for unit in start.model.state_units]
+    lines += [f"# {text}" for text in _parameters(start.model)]
+    lines.append(
+        ",".join(
+            f"{name} [{unit}]" if unit else name for name, (unit, _) in zip(("t", *names), units, strict=True)
+        )
+    )
+    table *= [scale for _, scale in units]
+    lines += [",".join(f"{value:.10g}" for value in row) for row in table.tolist()]
     return "\n".join(lines) + "\n"
+
+
+_SHOWN = {"m": ("cm", 100.0)}  # the units of the page's reader
+
+
+def _parameters(model: Model) -> list[str]:
+    """Each parameter with its unit on the page, then the effects."""
+    ranges = page_model(model).ranges
+    lines = [
+        f"{name} [{unit}] = {model.parameters[name] * scale:.10g}"
+        if unit
+        else f"{name} = {model.parameters[name]:.10g}"
+        for name, (_, _, _, scale, unit) in ranges.items()
+    ]
+    return lines + [f"effect = {effect!r}" for effect in getattr(model, "effects", ())]

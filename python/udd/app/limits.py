@@ -25,8 +25,10 @@ class Budget:
 
 
 RUNS = Budget(processes=16, seconds=10.0, share=2.0)
-MAPS = Budget(processes=2, seconds=60.0, share=10.0)  # sections, diagrams, tables
+MAPS = Budget(processes=2, seconds=60.0, share=10.0)  # of sections, and again of diagrams and tables
 STEPS = 10_000_000  # of a run
+KEPT = 64 << 20  # bytes of answers of each kind that are kept for equal questions
+CLASS_PAGES = 8  # open at once from one address, in a class
 QUESTIONS = 64  # that a page may have open
 CONNECTIONS = 256  # in all
 CLIENT_CONNECTIONS = 64  # from one address

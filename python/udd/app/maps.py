@@ -22,7 +22,7 @@ from .spec import Start, drive_of
 Array = NDArray[np.float64]
 
 _TRANSIENT = 60  # crossings left out
-VALUES = (45, 300)  # of the drive: a first picture within a second, then a better one
+VALUES = (20, 60, 300)  # of the drive: a first picture at once, then better ones
 _KEPT = 40  # points of every orbit in a diagram
 
 
@@ -99,9 +99,9 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
             name,
             values,
             n=_KEPT,
-            transient=2 * _TRANSIENT if len(values) > VALUES[0] else _TRANSIENT // 2,
+            transient=2 * _TRANSIENT if len(values) >= VALUES[-1] else _TRANSIENT // 2,
             initial_states=starts,
-            max_extension=6,
+            max_extension=1 if len(values) == VALUES[0] else 6,  # which takes five times as long
             threads=_worker_threads(),
             progress=False,
         )

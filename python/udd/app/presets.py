@@ -1,6 +1,6 @@
 """What the page can offer: parameters with units and ranges, effects, presets.
 
-Their words are in static/texts.json.
+Their words are in static/texts.*.json.
 """
 
 from __future__ import annotations

@@ -27,6 +27,7 @@ from udd.models import Disk
 
 from . import limits, table_columns, uploads
 from .calculators import Calculators
+from .class_pages import Pages
 from .error_text import sentence
 from .folders import workspace
 from .growing_run import as_csv
@@ -39,38 +40,50 @@ from .stream import Page
 STATIC = Path(__file__).parent / "static"
 
 
-def make_app(token: str, hosts: list[str], *, any_address: bool = False, prepared: bool = False) -> Starlette:
-    """The application; it answers to these hosts (``name:port``) and those who know the token.
+def make_app(
+    token: str,
+    hosts: list[str],
+    *,
+    any_address: bool = False,
+    prepared: bool = False,
+    classroom: bool = False,
+) -> Starlette:
+    """Make the application: it answers to these hosts (``name:port``) and those who know the token.
 
-    With `prepared`, processes wait for the first question.
+    With `prepared`, processes wait for the first question. In a `classroom` the page takes no files and makes
+    no films, and one address may open a few pages.
     """
     jobs = Jobs()
+    pages = Pages(limits.CLASS_PAGES if classroom else None)
     state: dict[str, Any] = {}
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         with workspace() as folder:
-            runs, maps = Calculators(limits.RUNS), Calculators(limits.MAPS)
-            state.update(folder=folder, runs=runs, maps=maps)
-            ready = asyncio.gather(runs.prepare(), maps.prepare()) if prepared else None
+            # Sections have processes of their own: a diagram takes a hundred times as long.
+            budgets = {"runs": limits.RUNS, "sections": limits.MAPS, "maps": limits.MAPS}
+            calculators = {kind: Calculators(budget) for kind, budget in budgets.items()}
+            state.update(folder=folder, **calculators, calculators=calculators)
+            ready = asyncio.gather(*(c.prepare() for c in calculators.values())) if prepared else None
             try:
                 async with jobs:
                     yield
             finally:
                 if ready is not None:
                     ready.cancel()
-                await asyncio.gather(runs.close(), maps.close())
+                await asyncio.gather(*(c.close() for c in calculators.values()))
 
     async def page(_: Request) -> Response:
         return FileResponse(STATIC / "index.html")
 
     async def about(_: Request) -> Response:
-        return JSONResponse(catalogue())
+        return JSONResponse({**catalogue(), "classroom": classroom})
 
     async def table(request: Request) -> Response:
         start = start_of(parsed("the run", request.query_params.get("run", "")))
         seconds = _number(request, "seconds") or math.nan
-        text = await _while_there(request, state["maps"].ask(as_csv, start, seconds))
+        shown = request.query_params.get("units") == "shown"
+        text = await _while_there(request, state["maps"].ask(as_csv, start, seconds, shown))
         return _download(Response(text, media_type="text/csv"), "udd-run.csv")
 
     async def new_job(request: Request) -> Response:
@@ -106,23 +119,36 @@ def make_app(token: str, hosts: list[str], *, any_address: bool = False, prepare
         return _download(response, f"udd-{file.name}") if "download" in request.query_params else response
 
     async def socket(websocket: WebSocket) -> None:
-        await Page(websocket, jobs, state["runs"], state["maps"]).serve()
+        await pages.serve(websocket, Page(websocket, jobs, state["calculators"]))
 
     routes = [
         Route("/", page),
         Route("/api/catalogue", about),
         Route("/api/run.csv", table),
-        Route("/api/table", columns, methods=["POST"]),
-        Route("/api/jobs/{kind}", new_job, methods=["POST"]),
-        Route("/api/jobs/{job}/{name}", result),
         WebSocketRoute("/api/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
+    files_routes = [
+        Route("/api/table", columns, methods=["POST"]),
+        Route("/api/jobs/{kind}", new_job, methods=["POST"]),
+        Route("/api/jobs/{job}/{name}", result),
+    ]
+    if classroom:
+        routes += [
+            Route("/api/table", _no_files, methods=["POST"]),
+            Route("/api/jobs/{rest:path}", _no_files, methods=["GET", "POST"]),
+        ]
+    else:
+        routes += files_routes
     handlers: dict[Any, Callable[..., Any]] = {UddError: _refused}
     guard = Middleware(Guard, token=token, hosts=hosts, any_address=any_address)
     app = Starlette(routes=routes, middleware=[guard], exception_handlers=handlers, lifespan=lifespan)
     app.state.jobs, app.state.parts = jobs, state
     return app
+
+
+async def _no_files(_: Request) -> Response:
+    return PlainTextResponse("This page was started for a class: it takes no files and makes no films.", 403)
 
 
 async def _while_there(request: Request, work: Coroutine[Any, Any, Any]) -> Any:

@@ -12,7 +12,13 @@ from udd.errors import UddError
 
 
 def serve(
-    host: str, port: int, *, fragment: str = "", browser: bool = True, ready: Callable[[str], object] = print
+    host: str,
+    port: int,
+    *,
+    fragment: str = "",
+    browser: bool = True,
+    ready: Callable[[str], object] = print,
+    classroom: bool = False,
 ) -> None:
     """Serve the page until Ctrl-C.
 
@@ -25,7 +31,9 @@ def serve(
     browser : bool
         Whether to open one.
     ready : callable
-        Told the link once the server listens.
+        Called with the link once the server listens.
+    classroom : bool
+        Whether the page only simulates: no files, no films, a few pages for each address.
 
     Raises
     ------
@@ -47,7 +55,7 @@ def serve(
     token = new_token()
     shown = names[0] if not any_address else f"{network_address() or _own_name()}:{port}"
     link = f"http://{shown}/?token={token}"
-    server = server_of(make_app(token, names, any_address=any_address, prepared=True))
+    server = server_of(make_app(token, names, any_address=any_address, prepared=True, classroom=classroom))
     raise_file_limit()
     ready(link)
     if browser:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -32,10 +32,10 @@ _WAITING = 64  # messages that a page may be behind
 class Page:
     """What one connected page has asked for."""
 
-    def __init__(self, socket: WebSocket, jobs: Jobs, runs: Calculators, maps: Calculators) -> None:
+    def __init__(self, socket: WebSocket, jobs: Jobs, calculators: Mapping[str, Calculators]) -> None:
         self._socket = socket
         self._jobs = jobs
-        self._calculators = {"runs": runs, "maps": maps}
+        self._calculators = calculators
         self._runs = Runs()
         self._out: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(_WAITING)
         self._open: dict[asyncio.Task[None], tuple[str, int]] = {}  # questions by kind and generation
@@ -132,8 +132,8 @@ class Page:
         async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
             done = 0
             while done < count:
-                done = min(count, max(200, 2 * done))
-                points, outcome = await self._calculators["maps"].ask(maps.section, start, surface, done)
+                done = min(count, max(200, 4 * done))  # each call computes the earlier ones again
+                points, outcome = await self._calculators["sections"].ask(maps.section, start, surface, done)
                 yield wire.section(generation, points)
                 yield {"type": "section", "generation": generation, "found": len(points), "outcome": outcome}
                 if outcome != "finished":

@@ -24,7 +24,7 @@ def add(commands: Any) -> None:
         summary,
         (
             "udd app",
-            "udd app --host 0.0.0.0 --no-browser",
+            "udd app --classroom",
         ),
     )
     parser.add_argument(
@@ -35,8 +35,12 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--host",
-        default="127.0.0.1",
-        help="address to serve (default 127.0.0.1: this machine alone; others lets the network in)",
+        help="address to serve (default 127.0.0.1: this machine; with --classroom 0.0.0.0: the network)",
+    )
+    parser.add_argument(
+        "--classroom",
+        action="store_true",
+        help="for a class: only runs, sections and diagrams; no files; at most 8 pages for each device",
     )
     parser.add_argument("--port", type=int, default=_PORT, help=f"port (default {_PORT}; 0: any free one)")
     parser.add_argument("--no-browser", action="store_true", help="print the link, open nothing")
@@ -52,13 +56,22 @@ def run(args: argparse.Namespace) -> CommandResult:
     if args.link and "=" not in fragment:
         raise UddError(f"{args.link} is no link of the page: it has no # with a run behind it")
 
+    host = args.host or ("0.0.0.0" if args.classroom else "127.0.0.1")
+
     def ready(link: str) -> None:
         print(link + (f"#{fragment}" if fragment else ""), flush=True)
-        if not args.host.startswith("127.") and args.host != "localhost":
-            _show_code(link)
+        if not host.startswith("127.") and host != "localhost":
+            _show_code(link + (f"#{fragment}" if fragment else ""))
         print("Ctrl-C ends it.", file=sys.stderr, flush=True)
 
-    serve(args.host, args.port, fragment=fragment, browser=not args.no_browser, ready=ready)
+    serve(
+        host,
+        args.port,
+        fragment=fragment,
+        browser=not args.no_browser,
+        ready=ready,
+        classroom=args.classroom,
+    )
     return CommandResult("", {})
 
 

@@ -3,7 +3,7 @@ import { Axes, COLOURS, INK, line, span } from "./plot.js";
 import { t } from "./texts.js";
 
 const UNDECIDED = "#9a9a9a";
-const STEPS = 4; // diagrams and exponents, each in two passes
+const STEPS = 6; // diagrams and exponents, each in three passes
 const KEPT = 12;
 
 export class Diagram {
@@ -206,7 +206,7 @@ export class Diagram {
     const c = this.axes.begin([low, high, ...range], "", t(`axis_${name}`), { bottom: false });
     if (!f) return;
     const colours = new Map();
-    const size = f.values > 120 ? 1.4 : 2;
+    const size = f.values > 120 ? 1.4 : f.values > 30 ? 2 : 3;
     this.axes.clipped(() => {
       for (let s = 0; s < f.starts; s++) {
         for (let v = 0; v < f.values; v++) {

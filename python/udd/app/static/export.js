@@ -1,6 +1,7 @@
 // What can be taken away: table, picture, film, Python.
 import { python } from "./address.js";
 import { address, request } from "./link.js";
+import { GROUND, INK, sharpen, SOFT } from "./plot.js";
 import { t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
@@ -8,8 +9,9 @@ const $ = (id) => document.getElementById(id);
 export function exporting(page) {
   const run = () => JSON.stringify(page.home);
   const acts = {
-    csv: () => save(address("/api/run.csv", { run: run(), seconds: String(seconds(page, 1)) }), "udd-run.csv"),
-    png: () => picture().toBlob((blob) => save(URL.createObjectURL(blob), "udd.png")),
+    csv: () => table(page, run(), { units: "shown" }),
+    exact: () => table(page, run()),
+    png: () => picture(page).toBlob((blob) => save(URL.createObjectURL(blob), "udd.png")),
     mp4: () => film(page, run()),
     python: () => page.copy(python(page.home, page.catalogue), t("copied_python")),
   };
@@ -35,20 +37,56 @@ function save(href, name) {
   a.click();
 }
 
-/** All pictures that are shown, side by side as on the page. */
-function picture() {
+function table(page, run, more = {}) {
+  save(address("/api/run.csv", { run, seconds: String(seconds(page, 1)), ...more }), "udd-run.csv");
+}
+
+/** All pictures that are shown, as on the page but at least twice as sharp, with their titles and the run's parameters. */
+function picture(page) {
+  const ratio = Math.max(2, window.devicePixelRatio || 1);
   const shown = [...$("explore").querySelectorAll("canvas")].filter((c) => c.offsetParent && c.width);
+  const titles = [...$("explore").querySelectorAll("figcaption")].filter((e) => e.offsetParent);
   const boxes = shown.map((c) => c.getBoundingClientRect());
-  const [left, top] = [Math.min(...boxes.map((b) => b.left)), Math.min(...boxes.map((b) => b.top))];
-  const ratio = window.devicePixelRatio || 1;
+  const heads = titles.map((e) => e.getBoundingClientRect());
+  const all = [...boxes, ...heads];
+  const [left, top] = [Math.min(...all.map((b) => b.left)), Math.min(...all.map((b) => b.top))];
+  const wide = Math.max(...all.map((b) => b.right)) - left;
   const made = document.createElement("canvas");
-  made.width = ratio * (Math.max(...boxes.map((b) => b.right)) - left);
-  made.height = ratio * (Math.max(...boxes.map((b) => b.bottom)) - top);
   const c = made.getContext("2d");
-  c.fillStyle = "#fff";
+  const size = parseFloat(getComputedStyle(document.body).fontSize);
+  const font = (bold) => `${bold ? "600 " : ""}${size}px "Source Sans 3", "Helvetica Neue", Arial, sans-serif`;
+  c.font = font(false);
+  const lines = wrapped(c, page.describe(), wide - size);
+  const head = size * (2.2 + 1.35 * lines.length);
+  made.width = ratio * wide;
+  made.height = ratio * (Math.max(...all.map((b) => b.bottom)) - top + head);
+  c.scale(ratio, ratio);
+  c.fillStyle = GROUND;
   c.fillRect(0, 0, made.width, made.height);
-  for (const [k, box] of boxes.entries()) c.drawImage(shown[k], ratio * (box.left - left), ratio * (box.top - top));
+  sharpen(ratio);
+  page.redraw();
+  for (const [k, b] of boxes.entries()) c.drawImage(shown[k], b.left - left, b.top - top + head, b.width, b.height);
+  sharpen(null);
+  page.redraw();
+  c.fillStyle = INK;
+  c.textBaseline = "top";
+  c.font = font(true);
+  c.fillText(t("title"), size * 0.5, size * 0.4);
+  c.font = font(false);
+  for (const [k, text] of lines.entries()) c.fillText(text, size * 0.5, size * (1.8 + 1.35 * k));
+  c.fillStyle = SOFT;
+  for (const [k, b] of heads.entries()) c.fillText(titles[k].textContent, b.left - left + size * 0.5, b.top - top + head + 2);
   return made;
+}
+
+/** A text in lines that are no wider than this; it is broken after commas. */
+function wrapped(c, text, most) {
+  const lines = [""];
+  for (const part of text.split(/(?<=, )/)) {
+    if (lines.at(-1) && c.measureText(lines.at(-1) + part).width > most) lines.push("");
+    lines.push(lines.pop() + part);
+  }
+  return lines;
 }
 
 /** A film of the run from its start, made by the server. */

@@ -252,7 +252,7 @@ export class Loop {
       p.className = "formula";
       const b = document.createElement("b");
       b.textContent = e.equation;
-      p.append(`${e.title}: `, b, e.values.length ? ` with ${e.values.join(", ")}` : "");
+      p.append(`${e.title}: `, b, e.values.length ? ` ${t("loop_with", { values: e.values.join(", ") })}` : "");
       return p;
     }), ...[...found.limits, ...(found.warnings ?? [])].map((text) => {
       const p = document.createElement("p");

@@ -1,4 +1,4 @@
-// The keyboard: every key of the list in texts.json.
+// The keyboard: every key of the list in texts.en.json.
 const TYPED = new Set(["INPUT", "SELECT", "TEXTAREA"]);
 const SLIDES = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
 

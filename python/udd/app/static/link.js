@@ -2,6 +2,7 @@
 import { t } from "./texts.js";
 
 const KINDS = { 1: "piece", 2: "section-points", 3: "diagram-points", 4: "exponents", 5: "frame" };
+const REFUSED = 1013; // too many pages: the server has said so
 export const token = new URLSearchParams(location.search).get("token") ?? "";
 
 /** An address of this server, with the token. */
@@ -42,7 +43,8 @@ export class Link {
       this.emit("open");
     };
     this.socket.onmessage = ({ data }) => this.take(data);
-    this.socket.onclose = () => {
+    this.socket.onclose = ({ code }) => {
+      if (code === REFUSED) return;
       this.tries += 1;
       if (this.tries > 1) this.notice(t(this.tries > 6 ? "gone" : "lost"), true);
       setTimeout(() => this.connect(), Math.min(200 * 2 ** this.tries, 4000));

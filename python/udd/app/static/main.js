@@ -12,6 +12,7 @@ import { Panel } from "./panel.js";
 import { PhaseView, PlaneView } from "./phase.js";
 import { Player } from "./player.js";
 import { Sections } from "./sections.js";
+import { Series } from "./series.js";
 import * as texts from "./texts.js";
 import { Tour } from "./tour.js";
 import { Trail } from "./trail.js";
@@ -33,6 +34,7 @@ class Page {
     this.sections = new Sections(this.link, this);
     this.diagram = new Diagram(this.link, this);
     this.energy = new Energy(this);
+    this.series = new Series(this);
     this.what = new What();
     this.look = new Look();
     this.loop = new Loop(this.link, this);
@@ -44,10 +46,12 @@ class Page {
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.stats = { frames: 0, delays: [], ahead: Infinity };
     this.link.on("error", (m) => {
-      if (m.of !== "run") this.notice(m.text);
+      if (m.of === "page") this.notice(m.text, true);
+      else if (m.of !== "run") this.notice(m.text);
       else if (m.generation === this.player.generation) this.player.failed = m.text;
     });
     this.controls();
+    if (catalogue.classroom) this.classroom();
     this.fromAddress(true);
     this.tour = new Tour(this.tourSteps());
     addEventListener("hashchange", () => this.fromAddress(false));
@@ -77,6 +81,7 @@ class Page {
     if (changed) {
       this.sections.offer(model.kind);
       this.diagram.offer(model.kind);
+      this.series.offer(model.kind);
       this.phase.forget();
       for (const e of document.querySelectorAll(".beyond")) e.hidden = model.kind !== "disk";
     }
@@ -154,7 +159,7 @@ class Page {
       show(0.03, false, "section"),
       show(0.03, true, "section"),
       show(0.03, false, "diagram"),
-      () => this.page($("to-film")),
+      ...(this.catalogue.classroom ? [] : [() => this.page($("to-film"))]),
     ];
   }
 
@@ -186,6 +191,12 @@ class Page {
 
   // --- controls
 
+  /** In a class the page only simulates. */
+  classroom() {
+    for (const id of ["to-film", "export-mp4"]) $(id).hidden = true;
+    this.page($("to-explore"));
+  }
+
   controls() {
     $("play").addEventListener("click", () => (this.over ? this.begin(this.home.model, this.home.state) : this.play(!this.player.playing)));
     $("step").addEventListener("click", () => this.step());
@@ -209,8 +220,15 @@ class Page {
       e.textContent = [key, what][k];
       return e;
     })));
+    $("language").replaceChildren(...Object.entries(texts.LANGUAGES).map(([code, name]) => new Option(name, code)));
+    $("language").value = document.documentElement.lang;
+    $("language").addEventListener("change", () => {
+      this.begin(this.home.model, this.shownState(), { keepTrail: true });
+      this.toAddress(); // the reload goes on from what is shown
+      texts.speak($("language").value);
+    });
     exporting(this);
-    this.showMap = tabs(["section", "diagram", "energy", "what"].map((n) => $(`tab-${n}`)), (id) => {
+    this.showMap = tabs(["section", "diagram", "energy", "series", "what"].map((n) => $(`tab-${n}`)), (id) => {
       this.tab = id.slice(4);
       this.mapsDue = 0;
       if (this.home) this.toAddress();
@@ -230,11 +248,12 @@ class Page {
       p: () => this.projector(),
       l: () => this.share(),
       e: () => this.page($("to-explore")),
-      f: () => this.page($("to-film")),
+      f: () => this.catalogue.classroom || this.page($("to-film")),
       1: () => this.showMap($("tab-section")),
       2: () => this.showMap($("tab-diagram")),
       3: () => this.showMap($("tab-energy")),
-      4: () => this.showMap($("tab-what")),
+      4: () => this.showMap($("tab-series")),
+      5: () => this.showMap($("tab-what")),
       t: () => this.look.dark(),
       "?": () => $("keys").showModal(),
       "+": () => this.faster(1),
@@ -325,9 +344,32 @@ class Page {
       if (this.tab === "section") this.sections.update();
       if (this.tab === "diagram") this.diagram.update();
     }
+    this.drawMaps();
+  }
+
+  /** Draw all that is shown, though nothing has changed. */
+  redraw() {
+    if (!this.player.fresh && this.player.records[0]?.count) this.draw();
+    this.sections.dirty = this.diagram.dirty = true;
+    this.drawMaps();
+  }
+
+  drawMaps() {
     if (this.tab === "section") this.sections.draw();
     if (this.tab === "diagram") this.diagram.draw();
-    if (this.tab === "energy") this.energy.draw(player);
+    if (this.tab === "energy") this.energy.draw(this.player);
+    if (this.tab === "series") this.series.draw(this.player);
+  }
+
+  /** The run in one line: parameters with units, effects, start, time. */
+  describe() {
+    const { model, state } = this.home;
+    const about = this.about(model.kind);
+    const number = (v) => String(+v.toPrecision(6)).replace("-", "−");
+    const parameters = about.parameters.map((p) => `${p.name} = ${number(model[p.name] * p.scale)} ${p.unit}`.trim());
+    const effects = (model.effects ?? []).map(({ name, ...values }) => `${name} (${Object.values(values).join("; ")})`);
+    const start = about.states.map((name, k) => `${t(`s_${name}`).replace(/ \[.*/, "")} = ${number(this.scale(name) * state[k])} ${/\[(.*)\]/.exec(t(`s_${name}`))?.[1] ?? ""}`.trim());
+    return [...parameters, ...effects, t("picture_start", { state: start.join(", ") }), t("picture_now", { t: $("clock").textContent })].join(", ");
   }
 
   /** The columns that are drawn: the first of phase space, y, z, beta. */

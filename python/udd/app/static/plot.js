@@ -18,6 +18,14 @@ export function recolour() {
   for (const canvas of canvases) canvas.changed = true;
 }
 
+let ratio = null;
+
+/** Draw with so many pixels for each of CSS, or with the screen's own (null), from the next drawing on. */
+export function sharpen(pixels) {
+  ratio = pixels;
+  for (const canvas of canvases) canvas.changed = true;
+}
+
 /** A canvas whose units are CSS pixels. */
 export class Canvas {
   constructor(element) {
@@ -33,12 +41,12 @@ export class Canvas {
   fit() {
     if (this.changed) {
       this.changed = false;
-      const ratio = window.devicePixelRatio || 1;
+      const sharp = ratio ?? (window.devicePixelRatio || 1);
       this.width = this.element.clientWidth;
       this.height = this.element.clientHeight;
-      this.element.width = Math.round(this.width * ratio);
-      this.element.height = Math.round(this.height * ratio);
-      this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+      this.element.width = Math.round(this.width * sharp);
+      this.element.height = Math.round(this.height * sharp);
+      this.context.setTransform(sharp, 0, 0, sharp, 0, 0);
       this.text = parseFloat(getComputedStyle(this.element).fontSize) * 0.85;
     }
     return this.width > 20 && this.height > 20;
