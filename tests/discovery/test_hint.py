@@ -12,7 +12,7 @@ import pytest
 import discovered
 import udd
 from simulated import film
-from udd.discovery.experiment_design import SEPARATED, _films
+from udd.discovery.experiment_design import SEPARATED, _films, _ranked
 from udd.fitting import at_level, fit_record, record_of
 from udd.report import as_text, summary_of
 
@@ -30,6 +30,16 @@ def relaxed():
 def second(times, seed=6):
     """A film of the same disk at another drive."""
     return film(RELAXED.with_parameters({"W": times * DRIVE}), np.random.default_rng(seed), 30.0)[0]
+
+
+def test_evidence_is_said_as_odds():
+    (hint,) = _ranked([("for 40 s at twice the drive", {"slip": 23.1, "drag": 2.0})])
+    assert hint.text == (
+        "film for 40 s at twice the drive: it is expected to separate what was found from slip "
+        "(odds of 10¹⁰ to 1); not from drag"
+    )
+    (hint,) = _ranked([("for 40 s", {"slip": 2.0})])
+    assert "odds of 7.39 to 1, and 10⁴ to 1 are needed" in hint.text
 
 
 def test_a_second_drive_is_proposed_for_slip_or_relaxation():

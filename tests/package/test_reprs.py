@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,31 @@ def test_every_result_is_one_line(tmp_path: Path) -> None:
     long = {name: len(repr(result)) for name, result in made.items() if len(repr(result)) > 400}
     assert long == {}
     assert not any("\n" in repr(result) for result in made.values())
+
+
+@pytest.mark.parametrize("name", ["disk", "pendulum"])
+def test_every_part_of_a_discovery_is_one_line(name: str) -> None:
+    long: dict[str, int] = {}
+    seen: set[int] = set()
+
+    def look(part: object, path: str) -> None:
+        if id(part) in seen:
+            return
+        seen.add(id(part))
+        if dataclasses.is_dataclass(part) and not isinstance(part, type):
+            if len(repr(part)) > 400 or "\n" in repr(part):
+                long[path] = len(repr(part))
+            for field in dataclasses.fields(part):
+                look(getattr(part, field.name), f"{path}.{field.name}")
+        elif isinstance(part, list | tuple):
+            for k, inner in enumerate(part[:20]):
+                look(inner, f"{path}[{k}]")
+        elif isinstance(part, dict):
+            for key, inner in part.items():
+                look(inner, f"{path}[{key!r}]")
+
+    look(getattr(discovered, name)(), name)
+    assert long == {}
 
 
 def film(folder: Path) -> Film:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
+from udd._util.one_line import OneLine
 from udd.discovery.nonparametric.confounding import identifiable_part
 from udd.discovery.nonparametric.curve_scan import Curve, refined, rescored
 from udd.discovery.symbolic.expressions import softened, write
@@ -32,8 +33,8 @@ _SOFT = 1e-3
 _STILL = 0.05  # nats that another move would bring
 
 
-@dataclass(frozen=True)
-class CurveFit:
+@dataclass(frozen=True, repr=False)
+class CurveFit(OneLine):
     """A model with a curve, fitted.
 
     Attributes

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.odds import odds
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import renamed
@@ -143,9 +144,9 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
     for design, each in designs:
         parts = [nats for nats in each.values() if nats >= SEPARATED]
         if parts:
-            apart = ", ".join(f"{t} by {n:.0f} nats" for t, n in each.items() if n >= SEPARATED)
+            excluded = ", ".join(f"{t} (odds of {odds(n)})" for t, n in each.items() if n >= SEPARATED)
             left = ", ".join(t for t, n in each.items() if n < SEPARATED)
-            text = f"film {design}: what was found is then expected to part from {apart}"
+            text = f"film {design}: it is expected to separate what was found from {excluded}"
             text += f"; not from {left}" if left else ""
             result.append(NextExperiment(design, min(parts), each, text))
     if result:
@@ -155,9 +156,10 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
     design, each = max(designs, key=lambda d: max(d[1].values()))
     most = max(each.values())
     text = (
-        f"no feasible film would part them: {design} would tell most, {most:.1f} nats of the {SEPARATED:.0f}"
+        f"no feasible film would separate them: the best, {design}, is expected to give odds of "
+        f"{odds(most)}, and {odds(SEPARATED)} are needed"
     )
-    return [NextExperiment("", most, each, f"{text} that it takes")]
+    return [NextExperiment("", most, each, text)]
 
 
 def _films(fit: Fit) -> Iterator[Film]:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from udd._util.keywords import renamed_attribute
+from udd._util.one_line import OneLine
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.by_record import RecordAnswer, sentence
@@ -31,8 +32,8 @@ def _named(ratio: Ratio) -> dict[str, float]:
     return dict(zip(("value", "low", "high"), ratio, strict=True))
 
 
-@dataclass(frozen=True)
-class AddedEffect:
+@dataclass(frozen=True, repr=False)
+class AddedEffect(OneLine):
     """An effect that was added, with its numbers and its evidence.
 
     Attributes
@@ -103,8 +104,8 @@ class AddedEffect:
         }
 
 
-@dataclass(frozen=True)
-class Alternative:
+@dataclass(frozen=True, repr=False)
+class Alternative(OneLine):
     """A candidate that the data cannot tell from one that was chosen.
 
     Attributes
@@ -139,8 +140,8 @@ class Alternative:
         }
 
 
-@dataclass(frozen=True)
-class RejectedEffect:
+@dataclass(frozen=True, repr=False)
+class RejectedEffect(OneLine):
     """An effect that lowers the held-out error of a model which lacks something, but does not pass the tests.
 
     Attributes

@@ -10,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
 from udd._util import chi_squared
+from udd._util.one_line import OneLine
 
 from .record import Record
 
@@ -25,8 +26,8 @@ _BAND = 17
 _EXACT = 1e-12
 
 
-@dataclass(frozen=True)
-class Noise:
+@dataclass(frozen=True, repr=False)
+class Noise(OneLine):
     """How far a measurement is from what it measures.
 
     The variance of a channel is ``(factor sigma)^2 + (blur Omega)^2``, where ``sigma`` is what the

@@ -13,6 +13,7 @@ from udd import _core
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.keywords import renamed, renamed_attribute
+from udd._util.one_line import OneLine
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
@@ -42,8 +43,8 @@ def levels(kind: str) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(q / _FRAME**0.5 for q in level) for level in profile_of(kind).fit.model_error)
 
 
-@dataclass(frozen=True)
-class Problem:
+@dataclass(frozen=True, repr=False)
+class Problem(OneLine):
     """Measurements laid out for a model, with everything that a solve needs but its start.
 
     Attributes
@@ -74,8 +75,8 @@ class Problem:
         )
 
 
-@dataclass(frozen=True)
-class Point:
+@dataclass(frozen=True, repr=False)
+class Point(OneLine):
     """Values of all unknowns: the states, and for every film the model's, the camera's and the clock's.
 
     Attributes

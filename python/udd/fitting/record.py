@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 from scipy.ndimage import maximum_filter1d
 
+from udd._util.one_line import OneLine
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.measurement.unwrapping import unwrapped
@@ -33,8 +34,8 @@ _LEAP = 0.5  # of the steps before and after, which a bend of the motion does no
 _CLEANED = 8  # times odd frames are looked for: those that come close together spoil each other's look
 
 
-@dataclass(frozen=True)
-class Record:
+@dataclass(frozen=True, repr=False)
+class Record(OneLine):
     """Frames for the estimator.
 
     One measurement's, or those of several one after the other.

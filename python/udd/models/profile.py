@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.one_line import OneLine
+
 Floats = NDArray[np.float64]
 #: Parameters by name: numbers, or columns with a value for each of many orbits.
 Parameters = Mapping[str, Any]
@@ -224,8 +226,8 @@ class FitProfile:
     valid_error: float = 0.2
 
 
-@dataclass(frozen=True)
-class Coordinate:
+@dataclass(frozen=True, repr=False)
+class Coordinate(OneLine):
     """Something that an unknown curve can be a function of.
 
     Attributes

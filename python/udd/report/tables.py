@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from udd._util.odds import odds
 from udd._util.small_units import small_unit
 from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
@@ -189,7 +190,7 @@ def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, st
     """The best of the curves that were tried."""
     scans = discovery.curves
     return [
-        {"title": c.title, "evidence": wording.odds(c.evidence), "p": wording.probability(c.p)}
+        {"title": c.title, "evidence": odds(c.evidence), "p": wording.probability(c.p)}
         for c in (scans[stage][:most] if stage < len(scans) else [])
     ]
 

@@ -254,15 +254,6 @@ def with_error(value: float, error: float | None) -> str:
     return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
 
 
-def odds(nats: float) -> Markup | str:
-    """Evidence in nats as odds: ``10⁷ to 1``."""
-    power = nats / math.log(10.0)
-    if abs(power) < 3.0:
-        return f"{math.exp(nats):.3g} to 1" if power >= 0 else f"1 to {math.exp(-nats):.3g}"
-    raised = Markup("10<sup>{:.0f}</sup>").format(abs(power))
-    return raised + Markup(" to 1") if power > 0 else Markup("1 to ") + raised
-
-
 def probability(p: float) -> str:
     """A small probability as a person says it."""
     if p < 1e-3:

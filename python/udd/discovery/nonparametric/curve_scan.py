@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.one_line import OneLine
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.coordinates import Slot, coordinates, slots
 from udd.discovery.scoring.forcing import Responses, Score, responses, score_forcings
@@ -31,8 +32,8 @@ _FINER = 2  # times as many knots for the curve that is kept
 _FEW = 6  # of the best curves, tried with the momentum that goes with them too
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(OneLine):
     """A curve that one equation may lack, with the evidence for it.
 
     Attributes

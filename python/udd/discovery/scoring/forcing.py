@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.one_line import OneLine
 from udd.fitting import Fit
 from udd.models.profile import Coordinate
 
@@ -20,8 +21,8 @@ Array = NDArray[np.float64]
 _COLUMNS = 240  # scored at a time: what a long record takes in memory
 
 
-@dataclass(frozen=True)
-class Score:
+@dataclass(frozen=True, repr=False)
+class Score(OneLine):
     """What the score says of the amplitudes of one group of columns.
 
     Everything else optimal, chi2 falls by ``2 gradient . c - c . information c`` when they take the values c;
