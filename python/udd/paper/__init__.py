@@ -1,8 +1,8 @@
-"""The paper, reproduced: its figures drawn and its claims checked by the package's public functions.
+"""Reproduction of the paper: its figures drawn and its claims checked by the package's public functions.
 
-A figure is a function of a few lines in :mod:`udd.paper.figures`, a claim one in :mod:`udd.paper.claims`;
-both enter themselves into the lists below. Where the paper measured, a film is made of a run of its own
-model, and tracked.
+A figure is a short function in :mod:`udd.paper.figures`, a claim one in :mod:`udd.paper.claims`; both
+register themselves in the lists below. For the paper's measurements, a run of its model is rendered as a film
+and tracked.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Panels side by side, with letters, and a line that says where the data are from."""
+"""Figures with lettered panels side by side, and a note on the source of the data."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FILMED = "measured: a film made by udd.render, tracked by udd.track"
 def panels(
     rows: int, columns: int, width: float, height: float, *, note: str = "", projection: str | None = None
 ) -> tuple[Figure, list[Any]]:
-    """A new figure with its Axes, row by row; sizes in inches."""
+    """Make a figure and its Axes, row by row; sizes in inches."""
     from matplotlib.figure import Figure as New
 
     made = New(figsize=(width, height), layout="constrained")
@@ -27,5 +27,5 @@ def panels(
 
 
 def titled(ax: Axes, number: int, words: str) -> None:
-    """The panel's letter and what it shows."""
+    """Set the panel's title: its letter and its content."""
     ax.set_title(f"({'abcdefgh'[number]}) {words}", loc="left", fontsize="medium")

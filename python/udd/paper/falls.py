@@ -12,27 +12,26 @@ from udd._util.angles import wrapped
 
 Array = NDArray[np.float64]
 
-#: The centre rests at a plateau of theta where it hangs within this angle of straight down [rad].
+#: Largest angle from straight down [rad] at which the centre counts as resting at a plateau of theta.
 PLATEAU = 0.3
 
 
 @dataclass(frozen=True)
 class Falls:
-    """What the centre does between its passages of the contact.
+    """Statistics of the centre's falls between its passages of the contact.
 
     Attributes
     ----------
     side : ndarray of int, shape (n,)
-        To which side it falls: the sign of Y as it passes the contact downward, 1 to the right.
+        Side of the fall: the sign of Y as the centre passes the contact downward, 1 to the right.
     rose : ndarray of int, shape (n,)
-        On which side of the contact it rose before.
+        Side of the contact on which it rose before.
     turns : ndarray of int, shape (n,)
-        By how many whole turns, clockwise, theta has changed from hanging before the ascent to hanging after
-        the fall.
+        Change of theta in whole turns, clockwise, from hanging before the ascent to hanging after the fall.
     plateau : float
         Share of time in which theta is within 0.3 rad of hanging.
     rising : float
-        Share of time in which Z grows.
+        Share of time in which Z increases.
     ascent, descent : float
         Median time [s] from the lowest point to the top, and from there to the lowest point of the fall.
     """
@@ -47,12 +46,12 @@ class Falls:
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """How many falls in a row go to the same side."""
+        """Lengths of runs of falls to the same side."""
         return np.array([len(list(group)) for _, group in groupby(self.side.tolist())], dtype=np.int64)
 
 
 def falls(t: Array, Y: Array, Z: Array) -> Falls:
-    """Falls in a motion that is sampled much more finely than it swings.
+    """Compute the falls in a motion that is sampled much faster than it swings.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def falls(t: Array, Y: Array, Z: Array) -> Falls:
 
 
 def _last_minimum(Z: Array, first: int, last: int) -> int:
-    """Where the last swing turned upward for good."""
+    """Return the index at which the last swing turned upward for good."""
     turning = np.flatnonzero(
         (Z[first + 1 : last - 1] < Z[first : last - 2]) & (Z[first + 1 : last - 1] <= Z[first + 2 : last])
     )

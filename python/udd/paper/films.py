@@ -1,4 +1,4 @@
-"""Synthetic films of the paper's runs, and what the tracker sees in them."""
+"""Synthetic films of the paper's runs, and their tracked motion."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _STEP = 0.005  # s between samples of the run
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is filmed.
+    """Run and film settings.
 
     Attributes
     ----------
     W : float
-        m/s.
+        Drive, m/s.
     start : tuple of float
         [Omega, Y, Z, beta].
     duration : float
-        s.
+        Length, s.
     seed : int
-        Of the camera's noise.
+        Seed of the camera's noise.
     quality : float
-        Of the film's compression, as :func:`udd.render` takes it. A poor one lets a disk at rest freeze,
-        errors and all, which a fit takes for many frames that agree.
+        Compression quality, as in :func:`udd.render`. At a poor quality a disk at rest freezes, errors and
+        all, and a fit mistakes that for many independent frames.
     """
 
     W: float
@@ -54,24 +54,24 @@ RECIPES = {
 
 
 def film_of(name: str, folder: Path) -> Path:
-    """Where the film is."""
+    """Return the path of the film."""
     return folder / f"W{name}.mp4"
 
 
 def measured(name: str, folder: Path, tell: Callable[[str], None]) -> Measurement:
-    """The motion in a film, which is made and tracked unless an earlier call has left it in the folder.
+    """Return the motion in a film; make and track the film unless the folder holds it already.
 
     Raises
     ------
     UddError
-        The folder cannot be written to, or the extra ``track`` is not there.
+        The folder cannot be written to, or the extra ``track`` is not installed.
     """
     recipe = RECIPES[name]
     film, table, note = film_of(name, folder), folder / f"W{name}.csv", folder / f"W{name}.json"
     wanted = _said(recipe)
     if not (_read(note) == wanted and film.is_file() and table.is_file()):
         _make(recipe, name, film, table, tell)
-        write_whole(note, json.dumps(wanted).encode())  # last: what it stands beside is complete
+        write_whole(note, json.dumps(wanted).encode())  # last: it marks a complete film
     return read_measurement(table)
 
 
@@ -89,7 +89,7 @@ def _make(recipe: Recipe, name: str, film: Path, table: Path, tell: Callable[[st
 
 
 def _said(recipe: Recipe) -> dict[str, Any]:
-    """What must be the same for a film to be used again."""
+    """Return the settings that must be the same for a film to be used again."""
     model = repr(device.disk(recipe.W))
     said: dict[str, Any] = json.loads(json.dumps({"model": model, **asdict(recipe)}))
     return said

@@ -1,4 +1,4 @@
-"""All figures and claims, drawn, checked, and put on one page."""
+"""Draw all figures, check all claims, and write the page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DPI = 150
 
 @dataclass(frozen=True, repr=False)
 class Drawn(OneLine):
-    """A figure as a picture.
+    """Picture of a figure.
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class Drawn(OneLine):
     path : Path
         The picture, PNG or SVG.
     width : float
-        Of the picture [inch], so that all can be shown at one scale, their text of one size.
+        Width of the picture [inch], so that all are shown at one scale with text of one size.
     seconds : float
-        What drawing it took, films aside where they were there already.
+        Time to draw it, without films that existed already.
     """
 
     figure: Figure
@@ -43,14 +43,14 @@ class Drawn(OneLine):
 
 @dataclass(frozen=True, repr=False)
 class Checked(OneLine):
-    """A claim and what has become of it.
+    """Result of a claim's check.
 
     Attributes
     ----------
     claim : Claim
     verdict : Verdict
     seconds : float
-        What checking it took.
+        Time to check it.
     """
 
     claim: Claim
@@ -60,7 +60,7 @@ class Checked(OneLine):
 
 @dataclass(frozen=True, repr=False)
 class Reproduction:
-    """What :func:`reproduce` made.
+    """Result of :func:`reproduce`.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Reproduction:
     figures : tuple of Drawn
     claims : tuple of Checked
     left_out : tuple of Figure or Claim
-        What needs films, where there were to be none.
+        Entries that need films, if films were excluded.
     """
 
     page: Path
@@ -78,7 +78,7 @@ class Reproduction:
     left_out: tuple[Figure | Claim, ...] = ()
 
     def __repr__(self) -> str:
-        holds = sum(own.verdict.verdict == "holds" for own in self.claims)
+        holds = sum(check.verdict.verdict == "holds" for check in self.claims)
         text = f"{len(self.figures)} figures, {len(self.claims)} claims, {holds} of which hold"
         return f"<Reproduction {self.page}: {text}>"
 
@@ -98,24 +98,25 @@ def reproduce(
     Parameters
     ----------
     out : path
-        Folder to write to; made if it is not there. Films and what was tracked in them stay in its folder
-        ``films`` and are used again.
+        Folder to write to; created if necessary. Films and their tracked motion stay in its folder ``films``
+        and are used again.
     only : iterable of str, optional
-        Keys of figures and claims (see :data:`FIGURES`, :data:`CLAIMS`); by default all.
+        Keys of figures and claims (see :data:`FIGURES`, :data:`CLAIMS`); default: all.
     films : bool
-        Whether to make the figures and check the claims that need films, which takes minutes the first time.
+        Whether to include figures and claims that need films, which take minutes the first time.
     progress : bool or callable, optional
-        True shows a progress bar, False none; a function gets the state of the work as a text. By default a
-        bar shows after 2 s in a terminal or a notebook.
+        True shows a progress bar, False none; a function gets the state of the work as a text. Default: a bar
+        after 2 s in a terminal or a notebook.
 
     Returns
     -------
     Reproduction
+        `page` is the file with all pictures; `figures` and `claims` hold the results.
 
     Raises
     ------
     UddError
-        An unknown key, one that needs films while there are to be none, a folder that cannot be written to.
+        A key is unknown, a key needs films but ``films=False``, or the folder cannot be written to.
 
     Examples
     --------
@@ -143,25 +144,25 @@ def _worked(
     """Draw the figures, and check the claims."""
     lab = Lab(folder / "films", tell)
     drawn = []
-    for one in figures:
-        tell(f"drawing {one.key}")
+    for entry in figures:
+        tell(f"drawing {entry.key}")
         start = time.perf_counter()
-        path = folder / f"{one.key}.{'svg' if one.vector else 'png'}"
-        picture = one.draw(lab)
-        write_whole(path, page.svg(picture) if one.vector else page.png(picture, _DPI))
-        drawn.append(Drawn(one, path, picture.get_figwidth(), time.perf_counter() - start))
+        path = folder / f"{entry.key}.{'svg' if entry.vector else 'png'}"
+        picture = entry.draw(lab)
+        write_whole(path, page.svg(picture) if entry.vector else page.png(picture, _DPI))
+        drawn.append(Drawn(entry, path, picture.get_figwidth(), time.perf_counter() - start))
     checked = []
-    for own in claims:
-        tell(f"checking {own.key}")
+    for claim in claims:
+        tell(f"checking {claim.key}")
         start = time.perf_counter()
-        checked.append(Checked(own, own.check(lab), time.perf_counter() - start))
+        checked.append(Checked(claim, claim.check(lab), time.perf_counter() - start))
     return drawn, checked
 
 
 def _chosen(
     only: Iterable[str] | None, films: bool
 ) -> tuple[list[Figure], list[Claim], list[Figure | Claim]]:
-    """The figures and claims that are meant, in the paper's order, and those left out for want of films."""
+    """Return the chosen figures and claims in the paper's order, and those left out for lack of films."""
     keys = None if only is None else set([only] if isinstance(only, str) else only)
     for key in sorted(keys or ()):
         entry = FIGURES.get(key) or CLAIMS.get(key)
@@ -171,9 +172,9 @@ def _chosen(
                 f"are {', '.join(CLAIMS)}"
             )
         if entry.filmed and not films:
-            raise UddError(f"{key} needs a film, and there are to be none")
-    figures = [one for one in FIGURES.values() if keys is None or one.key in keys]
-    claims = [one for one in CLAIMS.values() if keys is None or one.key in keys]
+            raise UddError(f"{key} needs a film, but films are excluded; allow them, or leave {key} out")
+    figures = [entry for entry in FIGURES.values() if keys is None or entry.key in keys]
+    claims = [entry for entry in CLAIMS.values() if keys is None or entry.key in keys]
     chosen: list[Figure | Claim] = [*figures, *claims]
-    left_out = [] if films else [one for one in chosen if one.filmed]
+    left_out = [] if films else [entry for entry in chosen if entry.filmed]
     return [f for f in figures if f not in left_out], [c for c in claims if c not in left_out], left_out

@@ -1,4 +1,4 @@
-"""The page: pictures and the table of claims, in one file that needs nothing else."""
+"""Page with pictures and the table of claims, in one self-contained file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _CLASSES = {HOLDS: "holds", REMARK: "remark", FAILS: "fails"}
 
 
 def png(figure: Figure, dpi: int) -> bytes:
-    """A figure as a PNG file, the same bytes every time."""
+    """Write a figure as PNG, the same bytes every time."""
     picture = BytesIO()
     figure.savefig(picture, format="png", dpi=dpi, metadata={"Software": None})
     return picture.getvalue()
 
 
 def svg(figure: Figure) -> bytes:
-    """A figure as an SVG file, the same bytes every time; letters are outlines, so that no font is needed."""
+    """Write a figure as SVG, the same bytes every time; letters are outlines, so that no font is needed."""
     import matplotlib as mpl
 
     picture = BytesIO()
@@ -42,7 +42,7 @@ def svg(figure: Figure) -> bytes:
 
 
 def sentence(text: str) -> str:
-    """With a capital where it begins with a word, true minus signs, and a full stop."""
+    """Format a sentence: a capital if it begins with a word, true minus signs, and a full stop."""
     start = text[0].upper() if text[1:2].islower() else text[0]
     return re.sub(r"(?<![\w.])-(?=\d)", "−", f"{start}{text[1:]}.")
 
@@ -50,21 +50,21 @@ def sentence(text: str) -> str:
 def render(
     figures: Sequence[Drawn], claims: Sequence[Checked], left_out: Sequence[Entry | Claim] = ()
 ) -> str:
-    """The page as HTML."""
+    """Render the page as HTML."""
     environment = templates("udd.paper")
     environment.filters["sentence"] = sentence
     return environment.get_template("index.html").render(
-        figures=[(one, _embedded(one)) for one in figures],
+        figures=[(entry, _embedded(entry)) for entry in figures],
         claims=claims,
         classes=_CLASSES,
-        counts=Counter(one.verdict.verdict for one in claims),
+        counts=Counter(entry.verdict.verdict for entry in claims),
         order=(HOLDS, REMARK, FAILS),
         left_out=left_out,
-        filmed=any(one.figure.filmed for one in figures),
+        filmed=any(entry.figure.filmed for entry in figures),
         versions=versions("udd", "numpy", "scipy", "matplotlib"),
     )
 
 
-def _embedded(one: Drawn) -> str:
-    kind = "svg+xml" if one.figure.vector else "png"
-    return f"data:image/{kind};base64,{base64.b64encode(one.path.read_bytes()).decode()}"
+def _embedded(drawn: Drawn) -> str:
+    kind = "svg+xml" if drawn.figure.vector else "png"
+    return f"data:image/{kind};base64,{base64.b64encode(drawn.path.read_bytes()).decode()}"

@@ -1,4 +1,4 @@
-"""What a figure and a claim of the paper are, and the lists of all of them."""
+"""Registry of the paper's figures and claims."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Check = Callable[["Lab"], "Verdict"]
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the paper, or of what it discusses.
+    """Figure of the paper, or about its discussion.
 
     Attributes
     ----------
     key : str
-        What it is called on the command line and as a file.
+        Name on the command line and of the file.
     paper : str
-        Which figure of the paper it is, or which part it belongs to.
+        Number of the figure in the paper, or the section that it belongs to.
     title, caption : str
     filmed : bool
         Whether it needs films to be made and tracked.
     draw : callable
         Makes the picture.
     vector : bool
-        Whether it is kept as vector graphics (SVG): drawings of few lines.
+        Whether it is stored as vector graphics (SVG), for simple drawings.
     """
 
     key: str
@@ -49,7 +49,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What has become of a claim.
+    """Result of checking a claim.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Verdict:
     evidence : str
         The numbers.
     remark : str
-        What should be said beside them, if anything.
+        A qualification, if any.
     """
 
     verdict: str
@@ -67,14 +67,14 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper that can be computed.
+    """Sentence of the paper that can be computed.
 
     Attributes
     ----------
     key : str
-        What it is called on the command line.
+        Name on the command line.
     place : str
-        Where in the paper it stands.
+        Section of the paper.
     says : str
         The claim, in short.
     filmed : bool
@@ -97,7 +97,7 @@ CLAIMS: dict[str, Claim] = {}
 def figure(
     key: str, *, paper: str, title: str, caption: str, filmed: bool = False, vector: bool = False
 ) -> Callable[[Draw], Draw]:
-    """Enter a function into the list of figures."""
+    """Register a function as a figure."""
 
     def enter(draw: Draw) -> Draw:
         FIGURES[key] = Figure(key, paper, title, caption, filmed, draw, vector)
@@ -107,7 +107,7 @@ def figure(
 
 
 def claim(key: str, *, place: str, says: str, filmed: bool = False) -> Callable[[Check], Check]:
-    """Enter a function into the list of claims."""
+    """Register a function as a claim."""
 
     def enter(check: Check) -> Check:
         CLAIMS[key] = Claim(key, place, says, filmed, check)
@@ -117,7 +117,7 @@ def claim(key: str, *, place: str, says: str, filmed: bool = False) -> Callable[
 
 
 def judged(holds: bool, evidence: str, remark: str = "", otherwise: str = "") -> Verdict:
-    """The verdict on a claim: `remark` is said where it holds, `otherwise` where it does not."""
+    """Return the verdict on a claim, with `remark` if it holds and `otherwise` if it does not."""
     if holds:
         return Verdict(REMARK if remark else HOLDS, evidence, remark)
     return Verdict(FAILS, evidence, otherwise)

@@ -1,4 +1,4 @@
-"""Tracked motion, smoothed, with the angular velocity that no single frame shows."""
+"""Smoothed tracked motion, with the angular velocity that no single frame shows."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from udd.simulation.energy import angular_momentum
 
 _FRAMES = 7  # of a window: 0.28 s at the paper's 25 frames per second
 _ORDER = 4
-_FINER = 5  # points that are drawn for each frame
+_FINER = 5  # drawn points for each frame
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """What the pictures of :mod:`udd.plot` take for a run.
+    """Smoothed motion; the functions of :mod:`udd.plot` draw it like a run.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Smoothed:
     state : ndarray, shape (n, 4)
         [Omega, Y, Z, beta], Omega from the smoothed beta.
     model : Disk
-        With the drive and the size that were known.
+        With the known drive and size.
     """
 
     t: NDArray[np.float64]
@@ -41,13 +41,13 @@ class Smoothed:
 
 
 def smoothed(measurement: Measurement, model: Disk) -> Smoothed:
-    """Savitzky and Golay's local polynomials, splines between frames, lines where nothing was seen."""
+    """Smooth by Savitzky and Golay's local polynomials, splines between frames, lines over gaps."""
     from scipy.interpolate import CubicSpline
     from scipy.signal import savgol_filter
 
-    t, seen = measurement.t, measurement.seen
+    t, is_seen = measurement.t, measurement.seen
     step = float(np.median(np.diff(t)))
-    columns = [np.interp(t, t[seen], measurement[name][seen]) for name in ("Y", "Z", "beta")]
+    columns = [np.interp(t, t[is_seen], measurement[name][is_seen]) for name in ("Y", "Z", "beta")]
     y, z, beta = (savgol_filter(column, _FRAMES, _ORDER) for column in columns)
     omega = savgol_filter(columns[2], _FRAMES, _ORDER, deriv=1, delta=step)
     fine = np.linspace(t[0], t[-1], _FINER * (len(t) - 1) + 1)

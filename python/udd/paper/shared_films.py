@@ -1,4 +1,4 @@
-"""Where figures and claims get what they share: films that were tracked, and a place to keep them."""
+"""Tracked films that figures and claims share, and their folder."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .savgol import Smoothed, smoothed
 
 @dataclass
 class Lab:
-    """The folder for films, and who is told what is being done.
+    """Folder for films, and a callback for progress.
 
     Attributes
     ----------
     folder : Path
-        Where films and what was tracked in them are kept.
+        Folder of the films and their tracked motion.
     tell : callable
-        Told in a few words.
+        Called with a short description of each step.
     """
 
     folder: Path
@@ -32,25 +32,25 @@ class Lab:
     _fitted: list[Fit] = field(default_factory=list)
 
     def measured(self, name: str) -> Measurement:
-        """What was tracked in the film of a drive in cm/s, such as ``"1.4"``."""
+        """Return the tracked motion in the film of a drive in cm/s, such as ``"1.4"``."""
         if name not in self._measured:
             self._measured[name] = films.measured(name, made_folder(self.folder), self.tell)
         return self._measured[name]
 
     def smoothed(self, name: str) -> Smoothed:
-        """The same, smoothed, with the angular velocity."""
+        """Return the tracked motion, smoothed, with the angular velocity."""
         W = films.RECIPES[name].W
         return smoothed(self.measured(name), device.disk(W))
 
     def friction_fit(self) -> Fit:
-        """The friction law, fitted to the film without a drive, from a start that is not the answer."""
+        """Fit the friction law to the film without a drive, from a start away from the solution."""
         from udd.fitting.fit import fit
 
         if not self._fitted:
             measured = self.measured("0.0")
             self.tell("fitting the friction law")
             start = device.disk(0.0).replace(k0=0.02, k1=0.08, k2=0.04)
-            # The camera is a plain one, and the disk's size sets the scale.
+            # An ideal camera is assumed, and the disk's size sets the scale.
             camera = ["y0", "z0", "tilt"]
             self._fitted.append(fit(measured, start, free=["k0", "k1", "k2"], camera=camera))
         return self._fitted[0]

@@ -21,7 +21,7 @@ from udd.simulation.trajectory import simulate
 
 @functools.cache
 def _spectrum(W: float) -> Spectrum:
-    """Of the equations without the edge."""
+    """Compute the spectrum of the equations without the edge."""
     return lyapunov_spectrum(device.disk(W, beyond=True), t=40_000, tol=0.02, state0=device.FAST_START)
 
 
@@ -32,7 +32,7 @@ def _said(spectrum: Spectrum, unit: str = "/s") -> str:
 
 @functools.cache
 def _left(W: float, n: int = 400, time: float = 120.0) -> float:
-    """The share of random starts that leave the wheels within two minutes."""
+    """Compute the share of random starts that lose contact within two minutes."""
     random = np.random.default_rng(0)
     radius, angle = random.uniform(0.01, 0.05, n), random.uniform(0, 2 * np.pi, n)
     starts = np.stack(
@@ -44,14 +44,13 @@ def _left(W: float, n: int = 400, time: float = 120.0) -> float:
 
 @claim("chaos-3.9", place="Section 3 C", says="At W = 3.9 cm/s the motion is chaotic.")
 def chaos_39(_lab: Lab) -> Verdict:
-    """The exponent without the edge, and how many stay on the disk."""
-    spectrum, left = _spectrum(0.039), _left(0.039)
+    """Check the exponent without the edge, and the share of starts that stay on the disk."""
+    spectrum, lost = _spectrum(0.039), _left(0.039)
     remark = (
-        f"the attractor reaches beyond the disk's edge: {left:.0%} of random starts leave the wheels "
-        "within two minutes; the exponent "
-        'belongs to the equations without the edge (edge="ignore")'
+        f"the attractor reaches beyond the disk's edge: {lost:.0%} of random starts lose contact within two "
+        'minutes; the exponent belongs to the equations without the edge (edge="ignore")'
     )
-    return judged(spectrum.verdict == "chaos", _said(spectrum), remark if left > 0.1 else "")
+    return judged(spectrum.verdict == "chaos", _said(spectrum), remark if lost > 0.1 else "")
 
 
 @claim(
@@ -60,10 +59,10 @@ def chaos_39(_lab: Lab) -> Verdict:
     says="At W = 5.5 cm/s chaos is suppressed: a high-periodic state.",
 )
 def order_55(_lab: Lab) -> Verdict:
-    """The equations are chaotic there."""
+    """Check the verdict: the equations are chaotic there."""
     spectrum = _spectrum(0.055)
     otherwise = (
-        "for the model with the paper's constants, whose attractor also leaves the disk there; the "
+        "for the model with the paper's constants, whose attractor also reaches beyond the disk there; the "
         "device may differ"
     )
     return judged(spectrum.verdict == "periodic orbit", _said(spectrum), otherwise=otherwise)
@@ -71,7 +70,7 @@ def order_55(_lab: Lab) -> Verdict:
 
 @claim("order-7.1", place="Section 3 C", says="At W = 7.1 cm/s chaos is gone: the motion is periodic.")
 def order_71(_lab: Lab) -> Verdict:
-    """The period, and that the orbit is not its own mirror image."""
+    """Check the period, and that the orbit is not its own mirror image."""
     spectrum = _spectrum(0.071)
     run = simulate(spectrum.model, [0.0, spectrum.period / 2], spectrum.end, method="taylor")
     gap = np.abs(run.state[1, :3] * [-1, -1, 1] - run.state[0, :3]) / [10, 0.02, 0.02]
@@ -87,21 +86,21 @@ def order_71(_lab: Lab) -> Verdict:
     says="Now and then the wheels eject the disk, which follows the unstable ascent Z = Z₀ + W T too far.",
 )
 def ejection(_lab: Lab) -> Verdict:
-    """How often, by the drive."""
+    """Check the share of ejections, by the drive."""
     shares = {W: _left(W) for W in (0.014, 0.039, 0.055, 0.071)}
     words = ", ".join(f"{share:.0%} at {100 * W:.1f} cm/s" for W, share in shares.items())
-    return judged(shares[0.039] > 0, f"of 400 random starts leave within two minutes: {words}")
+    return judged(shares[0.039] > 0, f"of 400 random starts lose contact within two minutes: {words}")
 
 
 @claim("dle-3.9", place="Section 5 D", says="At w = 3.9 the DLE is chaotic.")
 def dle_39(_lab: Lab) -> Verdict:
-    """The exponent."""
+    """Check the exponent."""
     spectrum = lyapunov_spectrum(3.9, t=200_000, tol=2e-3)
     return judged(spectrum.verdict == "chaos", _said(spectrum, "per unit of time"))
 
 
 def _late(w: float, n: int = 16) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """States of a crowd after most chaotic transients, and how near each comes to itself 22 points before."""
+    """Return late states of several orbits, and how closely each returns to itself after 22 points."""
     starts = np.random.default_rng(1).normal(size=(n, 3))
     states = ensemble(DLE(w), 60_000.0, starts, rtol=1e-9).end
     y = poincare(DLE(w), n=200, state0=states, transient=0).component("y")
@@ -110,29 +109,28 @@ def _late(w: float, n: int = 16) -> tuple[NDArray[np.float64], NDArray[np.float6
 
 @claim("dle-4.5", place="Section 5 D", says="At w = 4.5 the DLE is high-periodic.")
 def dle_45(_lab: Lab) -> Verdict:
-    """Chaotic for long, then in 22 narrow bands; beside it periodic."""
+    """Check for a long chaotic transient, then 22 narrow bands; at a drive slightly above, a cycle."""
     early = lyapunov_spectrum(4.5, t=2000, tol=0.02, transient=100)
     states, gaps = _late(4.5)
     value, error = lyapunov(DLE(4.5), t=100_000, tol=3e-3, state0=states[0], with_error=True)
-    beside = _late(4.50001)[1]
+    shifted = _late(4.50001)[1]
     evidence = (
         f"up to t = 2000: {_said(early, 'per unit of time')}. After t = 60,000, {(gaps < 0.1).sum()} of "
         f"{len(gaps)} orbits "
         f"come back after 22 section points, to {np.median(gaps):.3f} in y (exponent {value:.3f} ± "
         f"{error:.3f}); "
-        f"at w = 4.50001 they do so to {np.median(beside):.1e}"
+        f"at w = 4.50001 they do so to {np.median(shifted):.1e}"
     )
     remark = (
-        "only after a chaotic transient of thousands of units, and in a window of w some 3e-5 wide; at "
-        "4.5 itself the "
-        "motion is chaotic still, in 22 bands that a picture does not resolve"
+        "only after a chaotic transient of thousands of units, and in a window of w some 3e-5 wide. At 4.5 "
+        "itself the motion is still chaotic, in 22 bands that a picture does not resolve"
     )
     return judged(bool((gaps < 0.1).mean() > 0.8), evidence, remark)
 
 
 @claim("dle-7.1", place="Section 5 D", says="At w = 7.1 the DLE is low-periodic.")
 def dle_71(_lab: Lab) -> Verdict:
-    """The symmetric figure-eight, and how near its symmetry breaks."""
+    """Check the symmetric figure-eight, and its distance from the symmetry breaking."""
     orbit = periodic_orbit(DLE(7.1))
     branch = continuation(periodic_orbit(DLE(10.0)), "w", (6.5, 12.0))
     breaking = branch.find("symmetry breaking")[0].value
@@ -154,10 +152,10 @@ def dle_71(_lab: Lab) -> Verdict:
     says="Over some drives several states of the DLE are present at one and the same drive.",
 )
 def coexistence(_lab: Lab) -> Verdict:
-    """Two kinds of attractor from random starts at w = 7.6."""
+    """Check for two kinds of attractor from random starts at w = 7.6."""
     starts = np.random.default_rng(3).normal(size=(60, 3)) * 3
-    found = poincare(DLE(7.6), n=24, state0=starts, transient=3000)
-    spread = np.ptp(np.abs(found.component("y")), axis=-1)
+    section = poincare(DLE(7.6), n=24, state0=starts, transient=3000)
+    spread = np.ptp(np.abs(section.component("y")), axis=-1)
     simple = spread < 1e-6
     evidence = (
         f"at w = 7.6, {simple.sum()} of 60 random starts end on the symmetric figure-eight, "

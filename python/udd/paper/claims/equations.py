@@ -17,14 +17,16 @@ from udd.simulation.trajectory import simulate
     says="Without a drive R is constant; without gravity Y and the orientation are, and Z = Z₀ + W T.",
 )
 def limits(_lab: Lab) -> Verdict:
-    """The two limiting cases of the kinematic equations."""
+    """Check the two limiting cases of the kinematic equations."""
     still = simulate(device.disk(0.0), np.linspace(0, 5, 501), device.ZERO_START, method="taylor")
     radius = np.ptp(np.hypot(still.Y, still.Z))
     light = simulate(device.disk(0.039).replace(g=0.0), np.linspace(0, 1, 101), [0, 0.02, -0.02, 0])
     off = np.abs(
         light.state - np.stack([0 * light.t, 0 * light.t + 0.02, -0.02 + 0.039 * light.t, 0 * light.t], 1)
     )
-    evidence = f"in runs R stays the same to {radius:.0e} m, and Y, Z, β are as said to {off.max():.0e}"
+    evidence = (
+        f"in runs R is constant to {radius:.0e} m, and Y, Z, β agree with the formulas to {off.max():.0e}"
+    )
     return judged(radius < 1e-9 and off.max() < 1e-12, evidence)
 
 
@@ -34,7 +36,7 @@ def limits(_lab: Lab) -> Verdict:
     says="dJ/dT = g Y − k Ω with J = I Ω − W Y is the same as I dΩ/dT = g Y − k Ω − W Z Ω.",
 )
 def angular_momentum(_lab: Lab) -> Verdict:
-    """J from the angular velocity's equation against the torque."""
+    """Check J from the angular velocity's equation against the torque."""
     model = device.disk(0.039)
     states = np.random.default_rng(0).normal(size=(1000, 4)) * [5, 0.02, 0.02, 1]
     omega, y, z = states[:, 0], states[:, 1], states[:, 2]
@@ -48,7 +50,7 @@ def angular_momentum(_lab: Lab) -> Verdict:
 
 @claim("scales", place="Section 5 C", says="L = 4.6 mm and τ = 0.27 s, so that z = 10 is Z = 4.6 cm.")
 def scales(_lab: Lab) -> Verdict:
-    """From the constants."""
+    """Check the scales from the constants."""
     L, tau = device.L, device.TAU
     evidence = f"L = {1e3 * L:.6f} mm, τ = {tau:.7f} s, 10 L = {1e3 * L:.3f} cm"
     return judged(round(1e3 * L, 1) == 4.6 and round(tau, 2) == 0.27, evidence)
@@ -60,9 +62,9 @@ def scales(_lab: Lab) -> Verdict:
     says="The drives 3.9, 4.5 and 7.1 of the DLE are 6.7, 7.8 and 12.3 cm/s.",
 )
 def converted_drives(_lab: Lab) -> Verdict:
-    """W = w L/tau."""
+    """Check W = w L/tau."""
     converted = [100 * w * device.L / device.TAU for w in device.DLE_DRIVES]
-    gap = max(abs(own - said) for own, said in zip(converted, (6.7, 7.8, 12.3), strict=True))
+    gap = max(abs(value - said) for value, said in zip(converted, (6.7, 7.8, 12.3), strict=True))
     words = ", ".join(f"{value:.2f}" for value in converted)
     remark = "the last digit of the second and third is one too high: 7.7 and 12.2" if gap > 0.05 else ""
     return judged(gap < 0.1, f"W = w L/τ gives {words} cm/s", remark)
@@ -74,7 +76,7 @@ def converted_drives(_lab: Lab) -> Verdict:
     says="The drive wheel has a radius of 3 cm and turns at 0.3 to 3 rad/s.",
 )
 def drive_range(_lab: Lab) -> Verdict:
-    """W = rate x radius, beside the paper's drives."""
+    """Check W = rate x radius, and the paper's drives."""
     low, high = (Disk.from_wheel(rate).W for rate in (0.3, 3.0))
     used = (device.SLOW, *device.DRIVES, 0.088)
     evidence = (
@@ -92,7 +94,7 @@ def drive_range(_lab: Lab) -> Verdict:
     says="Without a drive the motion dies out after 3–4 oscillations.",
 )
 def zero_drive_swings(_lab: Lab) -> Verdict:
-    """Turning points larger than a millimetre."""
+    """Count turning points larger than a millimetre."""
     run = simulate(device.disk(0.0), np.linspace(0, 6, 12001), device.ZERO_START, method="taylor")
     turns = np.flatnonzero(run.Omega[1:-1] * run.Omega[2:] < 0) + 1
     large = turns[np.abs(run.Y[turns]) > 1e-3]
@@ -111,7 +113,7 @@ def zero_drive_swings(_lab: Lab) -> Verdict:
     says="The fitted orbit without a drive uses a constant moment of inertia I_O.",
 )
 def constant_inertia(_lab: Lab) -> Verdict:
-    """I_O alone against I_C + I_O."""
+    """Check I_O alone against I_C + I_O."""
     full = device.R**2 / 2 + 0.058**2
     times = []
     for inertia in (full, 0.058**2):
@@ -121,9 +123,9 @@ def constant_inertia(_lab: Lab) -> Verdict:
         times.append(run.t[np.flatnonzero(run.Omega[1:-1] * run.Omega[2:] < 0)[0] + 1])
     evidence = (
         f"the first swing ends at {times[0]:.3f} s with I_C + I_O, at {times[1]:.3f} s with I_O alone; "
-        "k₀, k₁ and k₂ go with the former"
+        "k₀, k₁ and k₂ belong to the former"
     )
-    remark = "it must be I_C + I_O, which is constant without a drive, that is meant"
+    remark = "the paper must mean I_C + I_O, which is constant without a drive"
     return judged(times[0] > 1.1 * times[1], evidence, remark)
 
 
@@ -134,11 +136,11 @@ def constant_inertia(_lab: Lab) -> Verdict:
     filmed=True,
 )
 def friction_law(lab: Lab) -> Verdict:
-    """The package's own fit of a film that was made with this law."""
+    """Check the package's own fit of a film that was made with this law."""
     fit = lab.friction_fit()
-    known = {"k0": device.K0, "k1": device.K1, "k2": device.K2}
-    parts = [f"{name} = {fit.parameters[name]:.5f} ± {fit.errors[name]:.5f}" for name in known]
-    far = max(abs(fit.parameters[name] - value) / fit.errors[name] for name, value in known.items())
+    law = {"k0": device.K0, "k1": device.K1, "k2": device.K2}
+    parts = [f"{name} = {fit.parameters[name]:.5f} ± {fit.errors[name]:.5f}" for name in law]
+    far = max(abs(fit.parameters[name] - value) / fit.errors[name] for name, value in law.items())
     evidence = (
         f"from the film: {', '.join(parts)}; at most {far:.1f} standard errors from the law it was made with"
     )

@@ -11,10 +11,10 @@ from udd.paper.registry import Verdict, claim, judged
 from udd.paper.shared_films import Lab
 
 
-def _sides(found: Falls) -> str:
-    lengths = found.lengths
+def _sides(statistics: Falls) -> str:
+    lengths = statistics.lengths
     return (
-        f"{len(found.side)} falls, {np.mean(found.side > 0):.0%} to the right; runs to one side of "
+        f"{len(statistics.side)} falls, {np.mean(statistics.side > 0):.0%} to the right; runs to one side of "
         f"{lengths.mean():.2f} falls on average, {lengths.max()} at most"
     )
 
@@ -25,7 +25,7 @@ def _sides(found: Falls) -> str:
     says="From cycle to cycle the disk falls to one side or the other, irregularly.",
 )
 def either_side(_lab: Lab) -> Verdict:
-    """Falls of twenty minutes."""
+    """Check the falls of twenty minutes."""
     slow, middle, fast = (falls_at(W) for W in (device.SLOW, 0.039, 0.071))
     evidence = (
         f"in twenty minutes at 1.4 cm/s {_sides(slow)}; at 3.9 cm/s {_sides(middle)} "
@@ -50,30 +50,27 @@ def either_side(_lab: Lab) -> Verdict:
     "where the disk alternates sides it returns to the same plateau.",
 )
 def theta_plateaus(_lab: Lab) -> Verdict:
-    """Whole turns against the sides on which the centre rose and fell."""
+    """Check whole turns against the sides on which the centre rose and fell."""
     words, same, steps = [], [], []
     for W in (device.SLOW, 0.039, 0.055):
-        found = falls_at(W)
-        turned = found.turns != 0
-        same.append(bool(np.array_equal(turned, found.side != found.rose)))
+        statistics = falls_at(W)
+        turned = statistics.turns != 0
+        same.append(bool(np.array_equal(turned, statistics.side != statistics.rose)))
         steps.append(int(turned.sum()))
         words.append(f"{turned.sum()} of {len(turned)} at {100 * W:.1f} cm/s")
     evidence = (
         f"Θ rests within 0.3 rad of a multiple of 2π for {falls_at(device.SLOW).plateau:.0%} of the time "
-        "at 1.4 cm/s; "
-        f"it goes on to another multiple in {', '.join(words)}"
+        f"at 1.4 cm/s; it goes on to another multiple in {', '.join(words)}"
     )
     otherwise = (
-        "what decides is not the side of the fall before: Θ goes on exactly where the centre falls to "
-        "the other side "
-        "than that on which it rose past the contact, in all of these falls"
+        "the side of the fall before does not decide: Θ goes on exactly if the centre falls to the other "
+        "side than that on which it rose past the contact, in all of these falls"
         if all(same)
         else "the side on which the centre rose does not decide either"
     )
     otherwise += (
-        ". In the paper's model at 1.4 cm/s it always falls to the side on which it rose, so Θ stays: "
-        "the film's "
-        "plateaus at other multiples need a change of sides on the axis, by noise or friction that sticks"
+        ". In the paper's model at 1.4 cm/s it always falls to the side on which it rose, so Θ stays. The "
+        "film's plateaus at other multiples need a change of sides on the axis, by noise or sticking friction"
     )
     return judged(steps[0] > 0 and not all(same), evidence, otherwise=otherwise)
 
@@ -85,7 +82,7 @@ def theta_plateaus(_lab: Lab) -> Verdict:
     "separation is lost.",
 )
 def slow_and_fast(_lab: Lab) -> Verdict:
-    """Median times of both, and the share of time in which Z grows."""
+    """Check the median times of both, and the share of time in which Z increases."""
     slow, fast = falls_at(device.SLOW), falls_at(0.071)
     evidence = (
         f"from the last low point to the top {slow.ascent:.2f} s, from there to the lowest "
@@ -104,14 +101,15 @@ def slow_and_fast(_lab: Lab) -> Verdict:
     filmed=True,
 )
 def falls_filmed(lab: Lab) -> Verdict:
-    """The same numbers from the tracked film."""
-    seen = lab.smoothed("1.4")
-    found = falls(seen.t, seen.state[:, 1], seen.state[:, 2])
-    own = falls_at(device.SLOW)
-    agree = int(np.argmin(np.append(found.side == own.side[: len(found.side)], False)))
+    """Check the same numbers from the tracked film."""
+    motion = lab.smoothed("1.4")
+    statistics = falls(motion.t, motion.state[:, 1], motion.state[:, 2])
+    computed = falls_at(device.SLOW)
+    agree = int(np.argmin(np.append(statistics.side == computed.side[: len(statistics.side)], False)))
     evidence = (
-        f"{_sides(found)}; rising takes {found.ascent:.2f} s, falling {found.descent:.2f} s, and Z grows "
-        f"{found.rising:.0%} of the time. The first {agree} falls go to the sides of the computed run"
+        f"{_sides(statistics)}; rising takes {statistics.ascent:.2f} s, falling {statistics.descent:.2f} "
+        "s, and Z grows "
+        f"{statistics.rising:.0%} of the time. The first {agree} falls go to the sides of the computed run"
     )
-    holds = found.ascent > 4 * found.descent and len(np.unique(found.side)) == 2
+    holds = statistics.ascent > 4 * statistics.descent and len(np.unique(statistics.side)) == 2
     return judged(bool(holds), evidence, "a synthetic film of a run of the model, tracked")

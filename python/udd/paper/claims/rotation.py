@@ -16,11 +16,11 @@ from udd.simulation.ensembles import ensemble
 
 
 def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarray:
-    """Which states are one of the rotating ones."""
+    """Return True for each state close to a rotating one."""
     goal = np.array([np.sqrt(w), np.sqrt(w), 0.0])
     mirror = goal * [-1, -1, 1]
-    near = [np.abs(states - one).max(axis=-1) < within for one in (goal, mirror)]
-    result: np.ndarray = near[0] | near[1]
+    is_close = [np.abs(states - target).max(axis=-1) < within for target in (goal, mirror)]
+    result: np.ndarray = is_close[0] | is_close[1]
     return result
 
 
@@ -31,12 +31,12 @@ def _is_rotating(states: np.ndarray, w: float, within: float = 1e-3) -> np.ndarr
     "growing pair.",
 )
 def unstable_rotation(_lab: Lab) -> Verdict:
-    """The branch of rotating states over six decades of the drive, against the cubic."""
+    """Check the branch of rotating states over six decades of the drive, against the cubic."""
     branch = rotation_of_dle(0.0, 1e-3, 1e3)
     pair = branch.multipliers.real.max(axis=1)
     roots = [np.roots([1, 1, w, 2 * w]) for w in branch.values]
-    own = [np.sort_complex(one) for one in branch.multipliers]
-    gap = max(np.abs(one - np.sort_complex(root)).max() for one, root in zip(own, roots, strict=True))
+    eigenvalues = [np.sort_complex(row) for row in branch.multipliers]
+    gap = max(np.abs(row - np.sort_complex(root)).max() for row, root in zip(eigenvalues, roots, strict=True))
     real = branch.multipliers.real.min(axis=1)
     evidence = (
         f"on the branch from w = 1e-3 to 1e3 the pair's real part is at least {pair.min():.1e}, the real "
@@ -52,7 +52,7 @@ def unstable_rotation(_lab: Lab) -> Verdict:
     says="The full moment of inertia and friction do not make the rotating states stable (not shown there).",
 )
 def unstable_rotation_disk(_lab: Lab) -> Verdict:
-    """Growth rates of the full disk along its branch."""
+    """Check growth rates of the full disk along its branch."""
     branch = rotation_of_disk(0.0, low=0.005)
     rates = branch.multipliers.real.max(axis=1)
     k = int(np.argmin(rates))
@@ -70,10 +70,10 @@ def unstable_rotation_disk(_lab: Lab) -> Verdict:
     says="In the rotating states R is much smaller than the disk's radius, and k is constant.",
 )
 def rotation_approximation(_lab: Lab) -> Verdict:
-    """At the paper's drives."""
-    found = {W: device.rotating(W) for W in (0.014, 0.039, 0.055, 0.071, 0.088)}
-    far = max(y for _, y, _ in found.values()) / device.R
-    slow = min(omega for omega, _, _ in found.values())
+    """Check at the paper's drives."""
+    states = {W: device.rotating(W) for W in (0.014, 0.039, 0.055, 0.071, 0.088)}
+    far = max(y for _, y, _ in states.values()) / device.R
+    slow = min(omega for omega, _, _ in states.values())
     evidence = (
         f"Y is at most {far:.1%} of the radius, |Ω| at least {slow:.2f} rad/s (the kink is at "
         f"{device.KINK:.2f})"
@@ -87,30 +87,30 @@ def rotation_approximation(_lab: Lab) -> Verdict:
     says="With B = 0.2 the rotating states are stable above a minimal drive.",
 )
 def damping_stabilises(_lab: Lab) -> Verdict:
-    """The Hopf point on the branch, against the closed form; and for the full disk."""
+    """Check the Hopf point on the branch against the closed form, and for the full disk."""
     branch = rotation_of_dle(device.B)
-    found, disk = hopf(branch), hopf(rotation_of_disk(RELAXATION))
-    if found is None or disk is None:
+    point, disk = hopf(branch), hopf(rotation_of_disk(RELAXATION))
+    if point is None or disk is None:
         return judged(False, "no Hopf bifurcation was found")
     closed = device.hopf_drive(device.B)
     evidence = (
-        f"Hopf bifurcation at w = {found.value:.10f} with the frequency {found.frequency:.8f}; closed forms "
+        f"Hopf bifurcation at w = {point.value:.10f} with the frequency {point.frequency:.8f}; closed forms "
         f"(1 − B)/(B (1 + B)) = {closed:.10f} and √((1 − B)/B) = 2. The full disk with b = B/L = "
         f"{RELAXATION:.1f} /m: "
         f"W = {100 * disk.value:.3f} cm/s"
     )
-    above = bool(branch.stable[branch.values > found.value].all())
-    below = bool(branch.stable[branch.values < found.value].any())
-    return judged(abs(found.value - closed) < 1e-10 and above and not below, evidence)
+    above = bool(branch.stable[branch.values > point.value].all())
+    below = bool(branch.stable[branch.values < point.value].any())
+    return judged(abs(point.value - closed) < 1e-10 and above and not below, evidence)
 
 
 @functools.cache
 def _kept_below() -> tuple[int, int]:
-    """Of starts close to the rotating state, 1 % below the minimal drive, how many are still there."""
+    """Count starts close to the rotating state, 1 % below the minimal drive, that stay there."""
     w = 0.99 * device.hopf_drive(device.B)
-    near = np.random.default_rng(0).normal(size=(200, 3)) * 0.05 + [np.sqrt(w), np.sqrt(w), 0]
-    ends = ensemble(DLE(w, B=device.B), 10_000.0, near, rtol=1e-8).end
-    return int(_is_rotating(ends, w, 0.1).sum()), len(near)
+    starts = np.random.default_rng(0).normal(size=(200, 3)) * 0.05 + [np.sqrt(w), np.sqrt(w), 0]
+    ends = ensemble(DLE(w, B=device.B), 10_000.0, starts, rtol=1e-8).end
+    return int(_is_rotating(ends, w, 0.1).sum()), len(starts)
 
 
 @claim(
@@ -119,7 +119,7 @@ def _kept_below() -> tuple[int, int]:
     says="The rotation's stability to finite disturbances may extend even below the minimal drive.",
 )
 def stable_below(_lab: Lab) -> Verdict:
-    """The Hopf bifurcation is subcritical: what surrounds the rotation is above, and unstable."""
+    """Check that the Hopf bifurcation is subcritical: its cycles are above it, and unstable."""
     point = hopf(rotation_of_dle(device.B))
     if point is None:
         return judged(False, "no Hopf bifurcation was found")
@@ -127,16 +127,13 @@ def stable_below(_lab: Lab) -> Verdict:
     kept, of = _kept_below()
     evidence = (
         f"the Hopf bifurcation is {point.criticality} (first Lyapunov coefficient "
-        f"{point.lyapunov_coefficient:.3e}): "
-        f"the cycles born there live at w = {cycles.values.min():.4f} to {cycles.values.max():.2f} and "
-        f"{'some are stable' if cycles.stable.any() else 'are unstable'}. 1 % below w_H, of {of} starts "
-        "within 0.05 of the "
-        f"rotation {kept} are there at t = 10,000"
+        f"{point.lyapunov_coefficient:.3e}). Its cycles exist at w = {cycles.values.min():.4f} to "
+        f"{cycles.values.max():.2f} and {'some are stable' if cycles.stable.any() else 'are unstable'}. 1 % "
+        f"below w_H, {kept} of {of} starts within 0.05 of the rotation are there at t = 10,000"
     )
     otherwise = (
-        "finite disturbances are survived above w_H only, where the unstable cycle bounds the rotation's "
-        "basin; "
-        "below, there is nothing to keep it"
+        "the rotation survives finite disturbances above w_H only, within the unstable cycle that bounds its "
+        "basin; below, nothing stabilises it"
     )
     return judged(kept > 0 or bool(cycles.stable.any()), evidence, otherwise=otherwise)
 
@@ -146,18 +143,18 @@ _SOON = 1500.0
 
 @functools.cache
 def _transients() -> tuple[float, float, float, float]:
-    """Mean life of the chaos at w = 3.7, B = 0.2, its error, and how many from -3.2 and -3.5 soon rotate."""
+    """Return the mean life of chaos at w = 3.7, its error, and the shares that soon rotate."""
     w = 3.7
     model = DLE(w, B=device.B)
     s = np.sqrt(w)
-    beside = np.random.default_rng(0).normal(size=(200, 3)) * 1e-3
+    offsets = np.random.default_rng(0).normal(size=(200, 3)) * 1e-3
     times = np.linspace(0, 20_000, 401)
-    states = ensemble(model, times, np.array([s, s, -3.5]) + beside, rtol=1e-7).state
+    states = ensemble(model, times, np.array([s, s, -3.5]) + offsets, rtol=1e-7).state
     there = _is_rotating(states, w, 0.05)
     lived = np.where(there.any(axis=1), times[there.argmax(axis=1)], times[-1])
     deaths = int(there.any(axis=1).sum())
     mean = float(lived.sum() / max(deaths, 1))
-    regular = ensemble(model, _SOON, np.array([s, s, -3.2]) + beside, rtol=1e-7).end
+    regular = ensemble(model, _SOON, np.array([s, s, -3.2]) + offsets, rtol=1e-7).end
     from_regular = float(_is_rotating(regular, w, 0.05).mean())
     return mean, mean / np.sqrt(max(deaths, 1)), from_regular, float((lived <= _SOON).mean())
 
@@ -169,7 +166,7 @@ def _transients() -> tuple[float, float, float, float]:
     "together.",
 )
 def bistable(_lab: Lab) -> Verdict:
-    """Starts close to the two, and how long the chaos lives."""
+    """Check starts close to the two, and the life of the chaos."""
     mean, error, low, high = _transients()
     parted = low > 0.99 and high < 0.3
     evidence = (
@@ -186,7 +183,7 @@ def bistable(_lab: Lab) -> Verdict:
     says="The rotating states cannot be reached from rest.",
 )
 def not_from_rest(_lab: Lab) -> Verdict:
-    """Starts at rest all over the disk, with the relaxation of the constraint."""
+    """Check starts at rest all over the disk, with the relaxation of the constraint."""
     shares = {}
     for W in (0.06, 0.071, 0.088):
         random = np.random.default_rng(0)
@@ -200,8 +197,7 @@ def not_from_rest(_lab: Lab) -> Verdict:
         f"of 300 starts at rest up to 4 cm from the contact, with b = 43.6 /m, rotate after a minute: {words}"
     )
     otherwise = (
-        "it was seen on the device, and is nearly so in the model just above the lower bound on W; at "
-        "larger drives "
-        "the model's swings fall into rotation"
+        "the device showed it, and it nearly holds in the model just above the lower bound on W; at larger "
+        "drives the model's swings turn into rotation"
     )
     return judged(max(shares.values()) < 0.01, evidence, otherwise=otherwise)

@@ -1,4 +1,4 @@
-"""Claims about the small drive, W = 1.4 cm/s: creep, heights, and what arrests the disk."""
+"""Claims about the small drive, W = 1.4 cm/s: creep, heights, and static friction."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from udd.simulation.trajectory import Trajectory, simulate
 
 @functools.cache
 def _run() -> Trajectory:
-    """Ten minutes at W = 1.4 cm/s."""
-    found = simulate(device.disk(device.SLOW), np.arange(0, 600, 0.005), device.SLOW_START, method="taylor")
-    if found.outcome != "finished":
-        raise UddError(f"the run at W = 1.4 cm/s ended early: {found.outcome}")
-    return found
+    """Run ten minutes at W = 1.4 cm/s."""
+    run = simulate(device.disk(device.SLOW), np.arange(0, 600, 0.005), device.SLOW_START, method="taylor")
+    if run.outcome != "finished":
+        raise UddError(f"the run at W = 1.4 cm/s ended early: {run.outcome}")
+    return run
 
 
 @functools.cache
 def _ascents() -> tuple[tuple[int, int], ...]:
-    """Where the centre passes the contact upwards, and the top that follows."""
+    """Return the indices at which the centre passes the contact upwards, and of the top after each."""
     run = _run()
     passes = np.flatnonzero((run.Z[:-1] < 0) & (run.Z[1:] >= 0))
     bounds = [*passes.tolist(), len(run.t)]
@@ -40,12 +40,12 @@ def _ascents() -> tuple[tuple[int, int], ...]:
 
 @claim("slow-chaos", place="Section 3 B", says="At W = 1.4 cm/s the motion is chaotic.")
 def slow_chaos(_lab: Lab) -> Verdict:
-    """The largest exponent."""
+    """Check the largest exponent."""
     value, error = lyapunov(device.disk(device.SLOW, beyond=True), t=40_000, tol=4e-3, with_error=True)
     return judged(
         value > 4 * error,
         f"largest Lyapunov exponent {value:.3f} ± {error:.3f} /s",
-        f"weakly: neighbours part by a factor e in {1 / value:.0f} s",
+        f"weakly: neighbouring orbits separate by a factor e in {1 / value:.0f} s",
     )
 
 
@@ -55,7 +55,7 @@ def slow_chaos(_lab: Lab) -> Verdict:
     says="In each cycle Z rises at nearly the constant speed W of the drive.",
 )
 def slow_ascent(_lab: Lab) -> Verdict:
-    """The slope of Z as the centre passes the contact."""
+    """Check the slope of Z as the centre passes the contact."""
     run = _run()
     slopes = []
     for first, _top in _ascents():
@@ -72,7 +72,7 @@ def slow_ascent(_lab: Lab) -> Verdict:
     says="The smaller Y is at first, the higher the disk is driven, and the deeper it falls.",
 )
 def higher_deeper(_lab: Lab) -> Verdict:
-    """Rank correlations over the cycles of ten minutes."""
+    """Check rank correlations over the cycles of ten minutes."""
     from scipy.stats import spearmanr
 
     run = _run()
@@ -94,7 +94,7 @@ def higher_deeper(_lab: Lab) -> Verdict:
     says="Static friction arrests the disk, stuck at a small Y, until the torque of gravity surpasses it.",
 )
 def static_friction(_lab: Lab) -> Verdict:
-    """In the paper's model nothing sticks: the disk creeps by a closed law."""
+    """Check that nothing sticks in the paper's model: the disk creeps by a closed law."""
     run = _run()
     slowest = min(float(np.abs(run.Omega[first : top + 1]).min()) for first, top in _ascents())
     creep = simulate(
@@ -104,16 +104,16 @@ def static_friction(_lab: Lab) -> Verdict:
     gap = abs(np.log(creep[1] / 1e-6) / law - 1)
     evidence = (
         "the friction torque k Ω vanishes with Ω, so no torque is too small to move the disk: in "
-        f"{len(_ascents())} "
-        f"ascents of ten minutes |Ω| is never below {slowest:.3f} rad/s. Let go 1 µm beside the axis it "
-        "creeps as "
-        f"Y = Y₀ exp[g (Z² − Z₀²)/(2 W k₁)], to {gap:.1%} in the exponent on the first 2 cm"
+        f"{len(_ascents())} ascents of ten minutes |Ω| is never below {slowest:.3f} rad/s. Released 1 µm "
+        "from "
+        f"the axis it creeps as Y = Y₀ exp[g (Z² − Z₀²)/(2 W k₁)], to {gap:.1%} in the exponent on the "
+        "first 2 cm"
     )
     otherwise = (
-        "this is about the paper's model, in which creep looks like sticking; a real disk may well "
-        "stick, but a "
-        "constant threshold would then carry it to its edge, since g Y does not change while it sticks "
-        '(udd.effects.coulomb with treatment="set-valued" shows it)'
+        "this is about the paper's model, in which creep looks like sticking. A real disk may well stick, "
+        "but "
+        "a constant threshold would then carry it to its edge, since g Y does not change while it sticks "
+        '(see udd.effects.coulomb with treatment="set-valued")'
     )
     return judged(slowest == 0.0, evidence, otherwise=otherwise)
 
@@ -124,7 +124,7 @@ def static_friction(_lab: Lab) -> Verdict:
     says="Motion is damped more strongly at low than at high angular velocity.",
 )
 def torque_shape(_lab: Lab) -> Verdict:
-    """The coefficient falls with the speed, the torque not everywhere."""
+    """Check that the coefficient falls with the speed, and the torque does not everywhere."""
     peak = device.K1**2 / (4 * device.K2)
     bottom = device.K0 * device.KINK
     evidence = (

@@ -1,4 +1,4 @@
-"""The disk as a clock: its period against the drive, and after a push."""
+"""The disk as a clock: its period over the drive, and after a push."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ C, D = 10.603754512, 0.1616
 
 
 def periods(w: Array) -> Array:
-    """Periods of the DLE's symmetric figure-eight, which crosses z = 0 upward twice in each."""
-    found = poincare(DLE(10.0), n=3, transient=3000, parameters={"w": w})
-    result: Array = found.t[..., 2] - found.t[..., 0]
+    """Compute periods of the DLE's symmetric figure-eight, which crosses z = 0 upward twice in each."""
+    section = poincare(DLE(10.0), n=3, transient=3000, parameters={"w": w})
+    result: Array = section.t[..., 2] - section.t[..., 0]
     return result
 
 
 def disk_periods(W: Array) -> Array:
-    """Periods of the disk [s], likewise."""
-    found = poincare(device.disk(0.1, beyond=True), n=3, transient=600, parameters={"W": W}, state0=EIGHT)
-    result: Array = found.t[..., 2] - found.t[..., 0]
+    """Compute periods of the disk [s], likewise."""
+    section = poincare(device.disk(0.1, beyond=True), n=3, transient=600, parameters={"W": W}, state0=EIGHT)
+    result: Array = section.t[..., 2] - section.t[..., 0]
     return result
 
 
@@ -47,12 +47,12 @@ def disk_periods(W: Array) -> Array:
     title="The upward-driven disk as a clock",
     caption="(a) Period of the DLE's figure-eight: T √w tends to 10.60375 as the drive grows, so T falls "
     "as w^(−1/2). (b) "
-    "The full disk does the same from 7.6 to 12.5 cm/s; its orbit grows, and at 15 cm/s it has no room "
-    "on the disk. (c) At w = 12 a push of the state by 1 % to 50 % is forgotten: the half "
+    "The full disk does the same from 7.6 to 12.5 cm/s; its orbit grows, and at 15 cm/s it is limited "
+    "by the disk's edge. (c) At w = 12 the DLE forgets a push of the state by 1 % to 50 %: the half "
     "periods return to the old value to ten digits.",
 )
 def clock(_lab: Lab) -> Figure:
-    """Period against drive, and after a push."""
+    """Draw the period over the drive, and after a push."""
     made, axes = panels(1, 3, 13.2, 4.0)
     w = np.geomspace(7.3, 300, 60)
     axes[0].plot(w, periods(w) * np.sqrt(w), color=AFTER, linewidth=1.8, label="computed")

@@ -1,4 +1,4 @@
-"""Falls to one side and the other, whole turns of theta, and how long rising and falling take."""
+"""Falls to either side, whole turns of theta, and durations of ascent and fall."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from udd.simulation.trajectory import Trajectory, simulate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: How long the disk is followed [s].
+#: Length of the runs [s].
 LONG = 1200.0
 
 
 @functools.cache
 def long_run(W: float) -> Trajectory:
-    """Twenty minutes of the disk; the equations are followed past its edge."""
+    """Run the disk for twenty minutes; the equations are valid past its edge."""
     start = device.SLOW_START if W <= device.SLOW else device.FAST_START
     return simulate(device.disk(W, beyond=True), np.arange(0, LONG, 0.005), start, method="taylor")
 
 
 @functools.cache
 def falls_at(W: float) -> Falls:
-    """The falls in it."""
+    """Compute the falls of the long run."""
     run = long_run(W)
     return falls(run.t, run.Y, run.Z)
 
@@ -40,17 +40,15 @@ def falls_at(W: float) -> Falls:
     "falls",
     paper="Section 3 B, Figure 7",
     title="Falls to one side and the other",
-    caption="The computed disk. (a) Whole turns of Θ = θ − π: a fall to the side on which the centre "
-    "rose leads "
-    "back to the same plateau, one to the other side to the next; at 1.4 cm/s the centre always falls to "
-    "the side "
-    "on which it rose. (b) How many falls in a row go to the same side, in twenty minutes; dots: a fair "
-    "coin's. "
+    caption="The computed disk. (a) Whole turns of Θ = θ − π. A fall to the side on which the centre rose "
+    "returns to the same plateau; a fall to the other side leads to the next. At 1.4 cm/s the centre "
+    "always falls to the side on which it rose. (b) Falls in a row to the same side, in twenty minutes; "
+    "dots: a fair coin's. "
     "(c) Median times from the last low point to the top (rising) and from there to the lowest point "
     "(falling).",
 )
 def sides(_lab: Lab) -> Figure:
-    """Theta, runs to one side, durations."""
+    """Draw theta, runs to one side, and durations."""
     made, axes = panels(1, 3, 13.2, 4.2)
     colours = (AFTER, BEFORE, "#009e73")
     for W, colour in zip((device.SLOW, 0.039, 0.055), colours, strict=True):

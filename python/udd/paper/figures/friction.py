@@ -1,4 +1,4 @@
-"""The friction law, fitted to the film without a drive."""
+"""Friction law, fitted to the film without a drive."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ if TYPE_CHECKING:
     "friction-computed",
     paper="Figure 9",
     title="The friction law and the swings without a drive, computed",
-    caption="(a, b) The disk let go at rest at R = 5.8 cm, 127° from upright, by the paper's law; "
-    "crosses: turning "
-    "points. (c) The coefficient k(Ω) = max(k₁ − k₂ |Ω|, k₀), which falls to its floor at 1.65 rad/s "
-    "(dotted). (d) The "
-    "torque k Ω that it makes: N-shaped, and without a threshold at rest.",
+    caption="(a, b) The disk released at rest at R = 5.8 cm, 127° from upright, by the paper's law; "
+    "crosses: turning points. (c) The coefficient k(Ω) = max(k₁ − k₂ |Ω|, k₀), which falls to its minimum "
+    "at 1.65 rad/s (dotted). (d) The torque k Ω: N-shaped, and without a threshold at rest.",
 )
 def friction_law(_lab: Lab) -> Figure:
-    """Y, Z, k and the torque."""
+    """Draw Y, Z, k and the torque."""
     made, axes = panels(2, 2, 9.6, 6.6)
     run = simulate(device.disk(0.0), np.arange(0, 4, 0.002), device.ZERO_START, method="taylor")
     turns = np.flatnonzero(run.Omega[1:-1] * run.Omega[2:] < 0) + 1
@@ -60,17 +58,14 @@ def friction_law(_lab: Lab) -> Figure:
     paper="Figure 9",
     title="The friction law from the swings without a drive",
     caption="(a, b) Tracked motion and a run of the fitted model from the fitted first state. (c) The "
-    "fitted k(Ω) with one standard "
-    "error, the law that the film was made with dashed. The film was made with the paper's law: that the "
-    "fit gives it back "
-    "is a check of renderer, tracker and fit on one another, not of the law. The scale of the picture "
-    "is taken "
-    "from the disk's known radius; were it free within 1 %, all three constants would share that 1 % at "
-    "least.",
+    "fitted k(Ω) with one standard error, and the film's law (dashed). The film was made with the paper's "
+    "law: the agreement checks renderer, tracker and fit against each other, not the law. The scale of "
+    "the picture is taken from the disk's known radius; if it were free within 1 %, all three constants "
+    "would have an error of at least 1 %.",
     filmed=True,
 )
 def friction(lab: Lab) -> Figure:
-    """Y, Z and k."""
+    """Draw Y, Z and k."""
     measured, fit = lab.measured("0.0"), lab.friction_fit()
     made, axes = panels(1, 3, 13.2, 4.0, note=FILMED)
     run = simulate(fit.model, np.arange(0, measured.t[-1], 0.005), fit.states[0], method="taylor")

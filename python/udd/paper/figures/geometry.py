@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     vector=True,
 )
 def geometry(_lab: Lab) -> Figure:
-    """Both views."""
+    """Draw both views."""
     made, axes = panels(1, 2, 11.0, 5.4)
     for k, (view, words) in enumerate((("side", "along the disk"), ("front", "in its plane"))):
         plot.geometry(axes[k], view=view)

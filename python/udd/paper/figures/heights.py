@@ -1,4 +1,4 @@
-"""The map of successive heights, and its limit for small drives."""
+"""Map of successive heights, and its limit for small drives."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The sideways motion left at the end of the swings is of size exp(-1/w), and all that follows hangs on it.
+#: Absolute tolerance: the sideways motion at the end of the swings is of size exp(-1/w), and determines all
+#: that follows.
 TINY = 1e-200
 
 
 def next_heights(w: float, low: float = 0.5, high: float = 2.6, n: int = 3000) -> tuple[Array, Array]:
-    """Heights from which the centre falls, each with the next one, of orbits let go all over a range.
+    """Compute pairs of successive heights from which the centre falls, for starts over a range of heights.
 
-    The maxima of z below the contact belong to the swings and are left out.
+    Maxima of z below the contact belong to the swings and are left out.
     """
     heights = np.linspace(low, high, n)
     starts = np.stack([np.full(n, np.sqrt(w)), np.full(n, np.sqrt(w)), heights], axis=-1)
@@ -43,19 +44,19 @@ def next_heights(w: float, low: float = 0.5, high: float = 2.6, n: int = 3000) -
 
 
 def maxima(w: float, starts: Array, n: int, time: float) -> Array:
-    """The maxima of z in a time, at most n for each start; rows of several starts end in NaN."""
+    """Compute the maxima of z within a time, at most n for each start; rows of several starts end in NaN."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IncompleteWarning)  # it is the time that is asked for, not the number
-        found = poincare(DLE(w), "maxima of z", n, state0=starts, transient=0, t_max=time, atol=TINY)
-    return found.component("z")
+        warnings.simplefilter("ignore", IncompleteWarning)  # the time is the limit, not the number
+        section = poincare(DLE(w), "maxima of z", n, state0=starts, transient=0, t_max=time, atol=TINY)
+    return section.component("z")
 
 
 def limit(following: Array) -> Array:
-    """The height from which the centre fell, if it rises to `following` next, as the drive vanishes.
+    """Return the height of the previous fall if the next one is `following`, in the limit of no drive.
 
-    With z rising as w t the spin obeys ``omega'' + omega' = z omega``: it decays as ``exp(-t/2)`` while the
-    centre swings (z < -1/4), then changes at the rate ``(sqrt(1 + 4 z) - 1)/2``. The next fall begins where
-    it is back at its old size, to leading order in w: ``6 (h + h') = (1 + 4 h')^(3/2)``.
+    With z = w t the spin obeys ``omega'' + omega' = z omega``. It decays as ``exp(-t/2)`` while the centre
+    swings (z < -1/4), then changes at the rate ``(sqrt(1 + 4 z) - 1)/2``. The next fall begins when it has
+    its old size again. To leading order in w that is ``6 (h + h') = (1 + 4 h')^(3/2)``.
     """
     result: Array = (1 + 4 * following) ** 1.5 / 6 - following
     return result
@@ -65,15 +66,13 @@ def limit(following: Array) -> Array:
     "heights",
     paper="Section 5 B, the map of successive heights",
     title="From one height to the next",
-    caption="How high the centre rises (z at its maximum) over the height from which it fell before, in "
-    "the DLE. The map has cusps, at "
-    "which the swings end with hardly any sideways motion left and the centre rises higher; they crowd as "
-    "w falls, by π w/√(h − 1/4). Black: the limit w → 0, 6 (h + h′) = (1 + 4 h′)^(3/2), whose fixed "
-    "point 1.353 is stable: "
-    "the chaos is in the cusps.",
+    caption="Height of the centre (the maximum of z) over the height of its previous fall, in the DLE. "
+    "At the map's cusps the swings end with hardly any sideways motion, and the centre rises higher. As w "
+    "decreases the cusps crowd, with the distance π w/√(h − 1/4). Black: the limit w → 0, "
+    "6 (h + h′) = (1 + 4 h′)^(3/2), whose fixed point 1.353 is stable: the chaos comes from the cusps.",
 )
 def heights(_lab: Lab) -> Figure:
-    """The map at three drives."""
+    """Draw the map at three drives."""
     made, axes = panels(1, 3, 12.6, 4.4)
     curve = np.linspace(0.6, 2.2, 200)
     for k, w in enumerate((0.1, 0.03, 0.01)):

@@ -1,4 +1,4 @@
-"""The centre's motion as a camera sees it: synthetic films, tracked."""
+"""Motion of the centre from tracked synthetic films."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     filmed=True,
 )
 def marks(lab: Lab) -> Figure:
-    """A sharp and a blurred frame."""
+    """Draw a sharp and a blurred frame."""
     from udd.tracking import pictures_at, pixels
 
     measured, smooth = lab.measured("1.4"), lab.smoothed("1.4")
@@ -50,7 +50,7 @@ def marks(lab: Lab) -> Figure:
     filmed=True,
 )
 def zero_drive(lab: Lab) -> Figure:
-    """Y and Z over time."""
+    """Draw Y and Z over time."""
     made, axes = panels(1, 2, 10.4, 3.8, note=FILMED)
     for k, name in enumerate(("Y", "Z")):
         plot.time_series(lab.measured("0.0"), axes[k], coordinates=[name])
@@ -66,7 +66,7 @@ def zero_drive(lab: Lab) -> Figure:
     filmed=True,
 )
 def slow_drive(lab: Lab) -> Figure:
-    """Y and Z, raw and smoothed."""
+    """Draw Y and Z, raw and smoothed."""
     made, axes = panels(2, 1, 10.4, 5.4, note=FILMED)
     measured, smooth = lab.measured("1.4"), lab.smoothed("1.4")
     for k, name in enumerate(("Y", "Z")):
@@ -91,7 +91,7 @@ def slow_drive(lab: Lab) -> Figure:
     filmed=True,
 )
 def slow_orbit(lab: Lab) -> Figure:
-    """J over time and the path of the centre."""
+    """Draw J over time and the path of the centre."""
     made, axes = panels(1, 2, 11.4, 4.4, note=FILMED)
     smooth = lab.smoothed("1.4")
     axes[0].plot(smooth.t, scale("J") * smooth.J, color=AFTER, linewidth=0.9)
@@ -114,7 +114,7 @@ def slow_orbit(lab: Lab) -> Figure:
     filmed=True,
 )
 def slow_polar(lab: Lab) -> Figure:
-    """Theta and R over time."""
+    """Draw theta and R over time."""
     made, axes = panels(2, 1, 10.4, 5.4, note=FILMED)
     smooth = lab.smoothed("1.4")
     y, z = smooth.state[:, 1], smooth.state[:, 2]
@@ -139,13 +139,12 @@ def slow_polar(lab: Lab) -> Figure:
     "measured-orbits",
     paper="Figure 8",
     title="Intermediate and large drive, measured",
-    caption="Starts were chosen for which the disk stays between the wheels for the 16 s of the film; at "
-    "3.9 and 5.5 cm/s many others "
-    "leave.",
+    caption="The starts were chosen so that the disk stays between the wheels for the 16 s of the film; "
+    "from many others at 3.9 and 5.5 cm/s it loses contact.",
     filmed=True,
 )
 def measured_orbits(lab: Lab) -> Figure:
-    """The centre's path at the paper's three drives."""
+    """Draw the centre's path at the paper's three drives."""
     made, axes = panels(1, 3, 12.6, 4.6, note=FILMED)
     for k, W in enumerate(device.DRIVES):
         plot.orbit(lab.smoothed(f"{100 * W:.1f}"), axes[k])

@@ -1,4 +1,4 @@
-"""How high the centre rises against its offset as it passes the contact: convection's onset in the disk."""
+"""Height of the centre over its offset at the contact: the disk's analogue of the onset of convection."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ OFFSETS = np.geomspace(1e-8, 3e-2, 60)
 
 
 def tops(w: float, offset: Array) -> Array:
-    """The height that the DLE's centre reaches, let go at rest at these offsets beside the contact."""
+    """Compute the height that the DLE's centre reaches from rest at these offsets from the contact."""
     starts = np.stack([0 * offset, offset, 0 * offset], axis=-1)
-    # What grows from 1e-8 must not drown in the absolute tolerance.
+    # Motion that grows from 1e-8 must stay above the absolute tolerance.
     result: Array = poincare(DLE(w), "maxima of z", 1, state0=starts, transient=0, atol=1e-30).component("z")
     return result[..., 0]
 
 
 def growth(height: Array) -> Array:
-    """What an offset grows by up to a height, as ``exp(growth/w)``.
+    """Compute the growth of an offset up to a height, as ``exp(growth/w)``.
 
-    The centre rises as z = w t; beside the axis the offset grows at the rate ``(sqrt(1 + 4 z) - 1)/2``, the
-    larger eigenvalue of ``omega' = y - omega, y' = omega z``. Its integral is
-    ``((1 + 4 h)^(3/2) - 1)/12 - h/2``.
+    The centre rises as z = w t. Near the axis the offset grows at the rate ``(sqrt(1 + 4 z) - 1)/2``, the
+    larger eigenvalue of ``omega' = y - omega, y' = omega z``. Its integral is ``((1 + 4 h)^(3/2) - 1)/12 -
+    h/2``.
     """
     result: Array = ((1 + 4 * height) ** 1.5 - 1) / 12 - height / 2
     return result
@@ -45,15 +45,13 @@ def growth(height: Array) -> Array:
     "overturning",
     paper="Section 6, convection",
     title="How high the centre rises before it overturns",
-    caption="The DLE, let go at rest with the offset y beside the contact, as a stratified fluid whose "
-    "centre of mass "
-    "passes the middle of its basin. (a) The height h that the centre reaches. (b) The growth of the "
-    "offset up to "
-    "that height, ((1 + 4h)^(3/2) − 1)/12 − h/2: all fall on lines of slope −w, drawn black with a free "
-    "intercept.",
+    caption="The DLE, released at rest with the offset y from the contact, like a stratified fluid whose "
+    "centre of mass passes the middle of its basin. (a) The height h that the centre reaches. (b) The "
+    "growth of the offset up to that height, ((1 + 4h)^(3/2) − 1)/12 − h/2. All points are on lines of "
+    "slope −w (black, with a free intercept).",
 )
 def overturning(_lab: Lab) -> Figure:
-    """Height and growth against the offset."""
+    """Draw height and growth over the offset."""
     made, axes = panels(1, 2, 9.6, 4.4)
     for w, colour in ((0.1, BEFORE), (0.03, "#e69f00"), (0.01, AFTER)):
         height = tops(w, OFFSETS)

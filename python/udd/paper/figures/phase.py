@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     filmed=True,
 )
 def measured_phase(lab: Lab) -> Figure:
-    """What the tracker saw, smoothed."""
+    """Draw the tracked and smoothed motion."""
     made, axes = panels(1, 3, 12.6, 4.6, note=FILMED, projection="3d")
     for k, W in enumerate(device.DRIVES):
         plot.phase_space(lab.smoothed(f"{100 * W:.1f}"), axes[k])
@@ -40,7 +40,7 @@ def measured_phase(lab: Lab) -> Figure:
     caption="The same from the equations, as in the figure of the computed orbits.",
 )
 def computed_phase(_lab: Lab) -> Figure:
-    """The full equations."""
+    """Draw the full equations."""
     made, axes = panels(1, 3, 12.6, 4.6, projection="3d")
     for k, W in enumerate(device.DRIVES):
         plot.phase_space(settled(W), axes[k])
@@ -50,7 +50,7 @@ def computed_phase(_lab: Lab) -> Figure:
 
 
 def _room(ax: Any) -> None:
-    """Fewer and smaller numbers, and names further out, lest they overlap."""
+    """Make tick labels fewer and smaller and move axis labels out, so that they do not overlap."""
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.get_major_locator().set_params(nbins=4)
         axis.labelpad = 6

@@ -1,4 +1,4 @@
-"""The steadily rotating states and what makes them stable."""
+"""Steadily rotating states and their stability."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 
 def _eigenvalue_panel(ax: Axes, damping: float) -> None:
-    """Real parts solid, imaginary parts dashed."""
+    """Draw eigenvalues: real parts solid, imaginary parts dashed."""
     branch = rotation_of_dle(damping)
     w = branch.values
-    found = np.array([one[np.argsort(np.abs(one.imag))] for one in branch.multipliers])
+    eigenvalues = np.array([row[np.argsort(np.abs(row.imag))] for row in branch.multipliers])
     ax.axhline(0, color=FAINT, linewidth=0.8)
-    ax.plot(w, found[:, 0].real, color=MEASURED, linewidth=1.6, label="the real eigenvalue")
-    ax.plot(w, found[:, 1].real, color=AFTER, linewidth=1.6, label="the pair, real part")
+    ax.plot(w, eigenvalues[:, 0].real, color=MEASURED, linewidth=1.6, label="the real eigenvalue")
+    ax.plot(w, eigenvalues[:, 1].real, color=AFTER, linewidth=1.6, label="the pair, real part")
     for sign, words in ((1, "the pair, imaginary part"), (-1, None)):
-        part = sign * np.abs(found[:, 1].imag)
+        part = sign * np.abs(eigenvalues[:, 1].imag)
         ax.plot(w, part, color=AFTER, linewidth=1.2, linestyle="--", label=words)
     ax.set_xlabel("drive w [1]")
     ax.set_ylabel("eigenvalue λ [1]")
@@ -45,7 +45,7 @@ def _eigenvalue_panel(ax: Axes, damping: float) -> None:
     caption="Eigenvalues at ω = y = √w, z = 0. The pair's real part is positive at every drive: unstable.",
 )
 def eigenvalues_plain(_lab: Lab) -> Figure:
-    """B = 0."""
+    """Draw the eigenvalues for B = 0."""
     made, axes = panels(1, 1, 6.4, 4.4)
     _eigenvalue_panel(axes[0], 0.0)
     return made
@@ -56,12 +56,11 @@ def eigenvalues_plain(_lab: Lab) -> Figure:
     paper="Figure 16",
     title="Stability with damping of the rolling constraint",
     caption="(a) Eigenvalues with B = 0.2: stable above w_H = (1 − B)/(B (1 + B)) = 10/3. (b) w = 3.7, from "
-    "ω = y = √w and z = −3.2 (blue, winds in) and z = −3.5 (orange, chaotic for a long time: the motion "
-    "is a transient "
-    "whose mean life is tens of thousands of units).",
+    "ω = y = √w and z = −3.2 (blue, spirals in) and z = −3.5 (orange, a chaotic transient with a mean "
+    "life of tens of thousands of units).",
 )
 def damped_rotation(_lab: Lab) -> Figure:
-    """B = 0.2."""
+    """Draw eigenvalues and orbits for B = 0.2."""
     made, axes = panels(1, 2, 11.2, 4.6)
     _eigenvalue_panel(axes[0], device.B)
     hopf = device.hopf_drive(device.B)
@@ -87,12 +86,12 @@ def damped_rotation(_lab: Lab) -> Figure:
     "rotating-states",
     paper="Section 3 C, Video 4",
     title="The two steadily rotating states of the disk",
-    caption="W = 8.8 cm/s, from near each rotating state. (a) With the paper's relaxation of the rolling "
-    "constraint, "
-    "b = B/L = 43.6 /m, both are reached and kept: Ω = ±√(g W/k₀). (b) Without it the disk leaves them.",
+    caption="W = 8.8 cm/s, starting close to each rotating state. (a) With the paper's relaxation of the "
+    "rolling constraint, b = B/L = 43.6 /m, both states are reached and stable: Ω = ±√(g W/k₀). (b) "
+    "Without it the motion leaves them.",
 )
 def rotating_states(_lab: Lab) -> Figure:
-    """Clockwise and anticlockwise, with and without the relaxation."""
+    """Draw both senses of rotation, with and without the relaxation."""
     made, axes = panels(1, 2, 10.4, 4.2)
     W = 0.088
     for k, b in enumerate((RELAXATION, 0.0)):
@@ -116,12 +115,11 @@ def rotating_states(_lab: Lab) -> Figure:
     paper="Section 5 E, for the full disk",
     title="The relaxation that keeps the rotation stable",
     caption="Above the curves the full disk's rotating state is stable to small disturbances. The "
-    "relaxation −b W Z may "
-    "change the rolling constraint alone, as the paper has it, or the angular momentum too. Dashed: the DLE, "
-    "w_H = (1 − B)/(B (1 + B)).",
+    "relaxation −b W Z changes the rolling constraint alone, as in the paper, or the angular momentum, "
+    "too. Dashed: the DLE, w_H = (1 − B)/(B (1 + B)).",
 )
 def relaxation_needed(_lab: Lab) -> Figure:
-    """Hopf points of the full disk in the plane of drive and relaxation."""
+    """Draw the Hopf points of the full disk over drive and relaxation."""
     made, axes = panels(1, 1, 6.8, 4.6)
     relaxation = np.geomspace(22.5, 85, 14)
     for momentum, colour, words in (
@@ -146,13 +144,13 @@ def relaxation_needed(_lab: Lab) -> Figure:
 
 
 def spun_down(drives: NDArray[np.float64], start: list[float], time: float = 60.0) -> NDArray[np.float64]:
-    """Mean and spread of Omega at each drive, which is changed step by step; shape (drives, 2) [rad/s]."""
+    """Compute mean and spread of Omega while the drive changes in steps; shape (drives, 2) [rad/s]."""
     state, rows = np.asarray(start), []
     for W in drives:
         run = simulate(relaxed(float(W), RELAXATION), np.arange(0, time, 0.02), state, method="taylor")
         late = run.Omega[len(run.t) // 2 :]
         rows.append((late.mean(), late.std()))
-        state = run.state[-1] + [0.0, 1e-6, 1e-6, 0.0]  # nothing is ever quite at rest
+        state = run.state[-1] + [0.0, 1e-6, 1e-6, 0.0]  # no real disk is exactly at rest
     return np.array(rows)
 
 
@@ -161,13 +159,12 @@ def spun_down(drives: NDArray[np.float64], start: list[float], time: float = 60.
     paper="Section 3 C",
     title="Spin-down: the drive is lowered, then raised again",
     caption="The full disk with b = 43.6 /m, 60 s at each drive; line: mean of Ω, band: its standard "
-    "deviation. Lowered, the rotation "
-    "holds until it turns unstable (below 5.92 cm/s by linear theory). Raised, the "
-    "chaotic swings last until they "
-    "happen to be caught by a rotating state: at high drives they are a transient. Grey: Ω = √(g W/k₀).",
+    "deviation. When the drive is lowered, the rotation persists until it becomes unstable (below "
+    "5.92 cm/s by linear theory). When it is raised, the chaotic swings last until they happen to reach a "
+    "rotating state: at high drives they are a transient. Grey: Ω = √(g W/k₀).",
 )
 def spin_down(_lab: Lab) -> Figure:
-    """Hysteresis of the rotating state."""
+    """Draw the hysteresis of the rotating state."""
     made, axes = panels(1, 1, 7.4, 4.6)
     down = np.arange(0.090, 0.0399, -0.002)
     omega, y, z = device.rotating(float(down[0]))

@@ -1,4 +1,4 @@
-"""A steady drive beside periodic ones: detuning, ripple, isochrony, and the path of a pumped swing."""
+"""Steady and periodic drives compared: detuning, ripple, isochrony, and the path of a pumped swing."""
 
 from __future__ import annotations
 
@@ -28,31 +28,31 @@ _RIPPLED = {"omega": "y - omega", "y": "omega*z", "z": "-omega*y + w*(1 + a*cos(
 
 
 def rippled(w: float, ripple: float, frequency: float) -> Model:
-    """The DLE whose drive ripples, ``w (1 + a cos(f t))``."""
+    """Return the DLE with a rippled drive, ``w (1 + a cos(f t))``."""
     return Model(["omega", "y", "z"], _RIPPLED, {"w": w, "a": ripple, "f": frequency})
 
 
 def jitter(ripple: float, ratio: float, n: int = 400) -> float:
-    """Relative r.m.s. of the clock's period, with a ripple at a multiple of the clock's frequency."""
+    """Compute the relative r.m.s. of the clock's period, with a ripple at `ratio` times its frequency."""
     model = rippled(CLOCK, ripple, ratio * 2 * np.pi / float(periods(np.array([CLOCK]))[0]))
-    found = poincare(model, "z", n, state0=[1.0, 1.0, 0.01], direction="up", transient=n, t_max=1e5)
-    whole = found.t[2::2] - found.t[:-2:2]  # z = 0 is crossed upward twice a period
+    section = poincare(model, "z", n, state0=[1.0, 1.0, 0.01], direction="up", transient=n, t_max=1e5)
+    whole = section.t[2::2] - section.t[:-2:2]  # z = 0 is crossed upward twice a period
     return float(np.std(whole) / np.mean(whole))
 
 
 def forced_swings(friction: float, n: int = 120) -> Array:
-    """Amplitudes of a pendulum from rest, one after the other, under a torque 5 % below its frequency."""
+    """Compute successive amplitudes of a pendulum from rest, with a torque 5 % below its frequency."""
     model = systems.torqued_pendulum(1.0, friction, 0.05, 0.95)
-    found = poincare(model, "v", n, state0=[0.0, 0.0], direction="down", transient=0, t_max=1e4)
-    result: Array = found.component("theta")
+    section = poincare(model, "v", n, state0=[0.0, 0.0], direction="down", transient=0, t_max=1e4)
+    result: Array = section.component("theta")
     return result
 
 
 def swing_period(model: Model, amplitude: Array) -> Array:
-    """Periods of a pendulum without friction, let go at these angles, over that of the smallest swings."""
+    """Compute periods of a frictionless pendulum released at these angles, relative to small swings."""
     starts = np.stack([0 * amplitude, amplitude], axis=-1)
-    found = poincare(model, "theta", 1, state0=starts, direction="down", transient=0)
-    result: Array = 4 * found.t[..., 0] / (2 * np.pi)
+    section = poincare(model, "theta", 1, state0=starts, direction="down", transient=0)
+    result: Array = 4 * section.t[..., 0] / (2 * np.pi)
     return result
 
 
@@ -60,18 +60,15 @@ def swing_period(model: Model, amplitude: Array) -> Array:
     "steady-clock",
     paper="Section 6, natural detuning",
     title="A steady drive beside a periodic one",
-    caption="(a) Amplitude of a pendulum from rest under a torque 5 % below its own frequency: without "
-    "friction it "
-    "detunes and is modulated for ever; with friction it locks to the torque, whose clock it then "
-    "repeats. (b) "
-    "R.m.s. of the period of the DLE's figure-eight at w = 12, relative, where the drive ripples by 1 % "
-    "or 5 %: "
-    "about half of the ripple (dotted) at most, and nothing where the ripple keeps step. (c) Period "
-    "against the size of the swing, "
-    "without friction: the plain pendulum's grows, Huygens' cheeks make it constant.",
+    caption="(a) Amplitude of a pendulum from rest under a torque 5 % below its own frequency. Without "
+    "friction it detunes and stays modulated; with friction it locks to the torque and repeats its clock. "
+    "(b) Relative r.m.s. of the period of the DLE's figure-eight at w = 12, if the drive ripples by 1 % "
+    "or 5 %: at most about half of the ripple (dotted), and zero if the ripple is in step. (c) Period "
+    "over the size of the swing, without friction: it grows for the plain pendulum and is constant with "
+    "Huygens' cheeks.",
 )
 def steady_clock(_lab: Lab) -> Figure:
-    """Modulation, ripple, isochrony."""
+    """Draw modulation, ripple and isochrony."""
     made, axes = panels(1, 3, 13.2, 4.2)
     for friction, colour in ((0.0, BEFORE), (0.01, "#e69f00"), (0.2, AFTER)):
         axes[0].plot(
@@ -105,14 +102,14 @@ def steady_clock(_lab: Lab) -> Figure:
 
 
 def eight(w: float = 10.0) -> tuple[Array, Array]:
-    """One period of the figure-eight's path (y, z), after the transient."""
+    """Compute one period of the figure-eight's path (y, z), after the transient."""
     before = simulate(DLE(w), 500.0, [1, 1, 0.01], method="taylor").state[-1]
     run = simulate(DLE(w), np.linspace(0, float(periods(np.array([w]))[0]), 801), before, method="taylor")
     return run.state[:, 1], run.state[:, 2]
 
 
 def pumped() -> tuple[Array, Array]:
-    """One period of the path of the rider's centre of mass on a pumped swing, in units of its mean length."""
+    """Compute one period of the rider's centre of mass on a pumped swing, in mean lengths of the swing."""
     model = systems.pumped_swing(1.0, friction=0.16, depth=0.1, quickness=10.0, sharpness=20.0)
     before = simulate(model, 800.0, [0.0, 0.5, 1.0]).state[-1]
     times = poincare(model, "theta", 2, state0=before, transient=0, direction="up").t
@@ -122,7 +119,7 @@ def pumped() -> tuple[Array, Array]:
 
 
 def lengths(y: Array, z: Array) -> tuple[float, float]:
-    """Mean distance from the pivot on the way out, away from straight down, and on the way back."""
+    """Compute the mean distance from the pivot on the way out (away from straight down) and back."""
     angle, distance = np.unwrap(np.arctan2(y, -z)), np.hypot(y, z)
     out = np.gradient(angle) * angle > 0
     return float(distance[out].mean()), float(distance[~out].mean())
@@ -133,13 +130,12 @@ def lengths(y: Array, z: Array) -> tuple[float, float]:
     paper="Section 6, the pumped swing",
     title="The figure-eight beside a pumped swing",
     caption="Path of the centre of mass over one period, arrows in the direction of motion; the cross is "
-    "the contact "
-    "or the pivot. (a) The DLE at w = 10. (b) A swing whose rider stands on the way out and squats on "
-    "the way in. "
-    "Both are shorter on the way out and longer on the way back, both have a bent figure-eight.",
+    "the contact or the pivot. (a) The DLE at w = 10. (b) A swing whose rider stands on the way out and "
+    "squats on the way in. Both are shorter on the way out and longer on the way back; both have a curved "
+    "figure-eight.",
 )
 def swing(_lab: Lab) -> Figure:
-    """Both paths."""
+    """Draw both paths."""
     made, axes = panels(1, 2, 9.6, 4.6)
     for k, ((y, z), words) in enumerate(((eight(), "DLE, w = 10"), (pumped(), "pumped swing"))):
         axes[k].plot(y, z, color=AFTER, linewidth=1.3)
