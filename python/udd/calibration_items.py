@@ -1,4 +1,4 @@
-"""What the tracker can calibrate: one entry for each item, read by options, table, command line and page."""
+"""Items that the tracker can calibrate; options, table, command line and page read this list."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 
 class Estimate(NamedTuple):
-    """A value, its standard error (0: given), and how it is known."""
+    """Value of an item, its standard error (0: given), and its source."""
 
     value: float | list[float]
     sigma: float
@@ -23,17 +23,17 @@ class Item:
     Attributes
     ----------
     name : str
-        As `calibrate` calls it.
+        Name of the item in `calibrate`.
     what : str
-        What it is, in a few words.
+        Short description.
     rows : tuple of str
-        Its rows in ``meta["calibration"]``; the name alone where empty.
+        Its rows in ``meta["calibration"]``; if empty, the row `name`.
     numbers : (float, float), optional
-        The range of a number that may be given for it; without, it is only switched on and off.
+        Allowed range, if a number may be given; else the item is only switched on and off.
     unit : str
-        Of that number.
+        Unit of that number.
     shown : (float, str)
-        The factor and unit in which a page shows it.
+        Factor and unit for display on the page.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Item:
     shown: tuple[float, str] = (1.0, "")
 
     def has(self, row: str) -> bool:
-        """Whether a row of the table is this item's."""
+        """Return True if a row of the table belongs to this item."""
         return row in (self.rows or (self.name,)) or (self.name == "layout" and row.startswith("mark "))
 
 
@@ -54,13 +54,16 @@ def _item(what: str, **more: Any) -> Any:
 
 @dataclass(frozen=True)
 class Calibrate:
-    """What the film is asked for. True: find it; False: not there, or as given; a number: it is that."""
+    """Switches of the self-calibration.
+
+    True: estimate the item; False: it is absent, or given elsewhere; a number: its value.
+    """
 
     layout: bool = _item("where the marks sit on the disk", shown=(1e3, "mm (right, up)"))
     scale: bool = _item("pixels per metre; off needs `scale`", shown=(1.0, "px/m"))
     lens: bool | float = _item("relative displacement at the picture's corner", numbers=(-0.3, 0.3))
     tilt: bool = _item(
-        "how the camera stands to the disk's plane", rows=("tilt across", "tilt upward", "aspect", "shear")
+        "camera's angle to the disk's plane", rows=("tilt across", "tilt upward", "aspect", "shear")
     )
     readout: bool | float = _item(
         "time of a rolling shutter from the first row to the last",
@@ -69,17 +72,17 @@ class Calibrate:
         shown=(1e3, "ms"),
     )
     exposure: bool | float = _item(
-        "time for which the shutter is open", numbers=(0.0, 0.1), unit="s", shown=(1e3, "ms")
+        "time during which the shutter is open", numbers=(0.0, 0.1), unit="s", shown=(1e3, "ms")
     )
     pivot: bool = _item("where the wheels hold the disk; off needs `pivot`", shown=(1.0, "px (right, down)"))
 
     def given(self, name: str) -> float | None:
-        """The value to take where an item is not to be found; None where it is."""
+        """Return the given value of an item, or None if it is to be estimated."""
         value = getattr(self, name)
         return None if value is True else float(value)
 
     def estimate(self, name: str, value: float, sigma: float, how: str) -> Estimate:
-        """What is known of an item that was found `how`, unless it was given."""
+        """Return the estimate of an item with its source, which is `how` unless the value was given."""
         return Estimate(value, sigma, how if self.given(name) is None else "given")
 
 
@@ -92,7 +95,7 @@ ITEMS = (
 
 
 def table(estimates: Mapping[str, Estimate]) -> dict[str, list[Any]]:
-    """Rows [value, standard error, how] in the order of `ITEMS`; None for what is not finite."""
+    """Return rows [value, standard error, source] in the order of `ITEMS`; None if a number is not finite."""
     rows = {name: e for item in ITEMS for name, e in estimates.items() if item.has(name)}
     return {name: [_plain(e.value), _plain(e.sigma), e.how] for name, e in rows.items()}
 
@@ -104,5 +107,5 @@ def _plain(value: Any) -> Any:
 
 
 def unit_of(row: str) -> tuple[float, str]:
-    """Factor and unit in which a page shows a row."""
+    """Return the factor and the unit for display of a row on the page."""
     return next((item.shown for item in ITEMS if item.has(row)), (1.0, ""))

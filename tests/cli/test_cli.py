@@ -378,7 +378,7 @@ def test_columns_and_inputs_by_name_of_several_kinds_of_files(
         (["--free", "k9"], "no parameter 'k9'"),
         (["--effect", "magic"], "no effect is called 'magic'"),
         (["--effect", "relaxation:b"], "parameter=number"),
-        (["--effect", "quadratic_drag:c=-5"], "c of quadratic_drag must lie between"),
+        (["--effect", "quadratic_drag:c=-5"], "c of quadratic_drag must be between"),
         (["--pendulum", "0.5"], "--pendulum does not apply"),
     ],
 )

@@ -63,7 +63,7 @@ def test_a_formula_goes_wherever_an_effect_goes() -> None:
     assert disk.effects[2].momentum == "consistent" and disk.units["curve.c4"] == "m/s"
     changed = disk.with_parameters({"warp.a": 0.5, "curve.c0": 1.0})
     assert changed.effects[1] == warped(0.5)
-    with pytest.raises(ModelError, match="n of warp must lie between 1 and 9"):
+    with pytest.raises(ModelError, match="n of warp must be between 1 and 9"):
         disk.with_parameters({"warp.n": 10.0})
     for model in (disk, changed):
         assert eval(repr(model), {**vars(effects), "slip": effects.slip, "Disk": udd.Disk}) == model
@@ -165,12 +165,12 @@ def test_a_surface_is_the_product_of_splines() -> None:
             lambda: formula("vertical", "c*Z", c=1.0, momentum="none"),
             "momentum of formula must be 'consistent'",
         ),
-        (lambda: formula("torque", "c*Z", c=1.0, name="slip"), "already: give the formula another name"),
+        (lambda: formula("torque", "c*Z", c=1.0, name="slip"), "give the formula another name"),
         (lambda: formula("torque", "c*Z", c=1.0, name="a b"), "must be a single word"),
         (lambda: formula("torque", "c*Z", c=1.0, amplitudes="c"), "amplitudes must be a list"),
         (lambda: formula("torque", "c*Z", c=1.0, amplitudes=["d"]), "formula has no parameter 'd'"),
-        (lambda: formula("torque", "c*Z", c=1.0, ranges={"c": (1, 0)}), "must go upwards"),
-        (lambda: formula("torque", "c*Z", c=2.0, ranges={"c": (0, 1)}), "must lie between 0 and 1"),
+        (lambda: formula("torque", "c*Z", c=1.0, ranges={"c": (1, 0)}), "must be (low, high)"),
+        (lambda: formula("torque", "c*Z", c=2.0, ranges={"c": (0, 1)}), "must be between 0 and 1"),
         (lambda: formula("torque", ["c"], c=2.0), "the formula must be text or a SymPy expression"),
         (lambda: udd.Pendulum(0.5, effects=formula("vertical", "c*Z", c=1.0)), "acts on a disk, not on a"),
         (lambda: udd.Disk(0.1, effects=formula("torque", "c*theta", c=1.0)), "acts on a pendulum, not on a"),

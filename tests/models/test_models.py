@@ -135,7 +135,7 @@ def test_a_fit_may_leave_the_physical_range() -> None:
         (lambda: effects.relaxation(momentum="none"), "momentum of relaxation must be"),
         (lambda: effects.coulomb(momentum="consistent"), "momentum of coulomb must be"),
         (lambda: effects.coulomb(c=-1.0), "between 0 and inf"),
-        (lambda: effects.coulomb(eps=0.0), "eps of coulomb must lie between"),
+        (lambda: effects.coulomb(eps=0.0), "eps of coulomb must be between"),
         (lambda: effects.Effect("gremlins", (1.0,)), "no effect is called 'gremlins'"),
         (lambda: effects.Effect("slip", (1.0, 2.0)), "takes 1 numbers"),
         (lambda: udd.DLE(1.0).rates(0.0, [1.0, 2.0]), "3 components"),

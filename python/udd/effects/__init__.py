@@ -1,9 +1,9 @@
 """Physical effects that the plain models lack.
 
 Each effect of the library has a constructor here, named after it: ``relaxation(b=5.0)``,
-``quadratic_drag(c=1e-4)``, ... They follow from the core's library, where each effect is one file that
-states its formula, its parameters with units and ranges, and the equation that it enters;
-:func:`library` lists them.
+``quadratic_drag(c=1e-4)``, ... They are generated from the core's library: one file for each effect states
+its formula, its parameters with units and ranges, and the equation that it enters. :func:`library` lists
+them.
 
 Examples
 --------
@@ -14,7 +14,8 @@ relaxation(b=5.0, momentum='constraint')
 >>> model.parameters["relaxation.b"]
 5.0
 
-An effect of no library is a :func:`formula`, a :func:`curve`, or a :func:`surface` over two coordinates:
+For effects outside the library use a :func:`formula`, a :func:`curve`, or a :func:`surface` over two
+coordinates:
 
 >>> effects.formula("torque", "c*sin(2*beta)", c=0.01, name="warp").equation
 'torque = c*sin(2*beta)'
@@ -32,7 +33,7 @@ __all__ = ["Effect", "Parameter", "Spec", "curve", "formula", "library", "surfac
 
 
 def _constructor(spec: Spec) -> Callable[..., Effect]:
-    """The function that makes an effect, with its signature and documentation."""
+    """Make the constructor of an effect, with its signature and documentation."""
     kind = inspect.Parameter.KEYWORD_ONLY
     arguments = [inspect.Parameter(p.name, kind, default=p.default) for p in spec.parameters]
     if spec.momenta:
@@ -49,9 +50,15 @@ def _constructor(spec: Spec) -> Callable[..., Effect]:
         low, high = p.range
         lines += [f"{p.name} : float", f"    {p.role.capitalize()} [{p.unit or '1'}], {low:g} to {high:g}."]
     if spec.momenta:
-        lines += [f"momentum : {{{', '.join(map(repr, spec.momenta))}}}", "    How it enters the momentum."]
+        lines += [
+            f"momentum : {{{', '.join(map(repr, spec.momenta))}}}",
+            "    Way to enter the angular momentum.",
+        ]
     if spec.treatments:
-        lines += [f"treatment : {{{', '.join(map(repr, spec.treatments))}}}", "    What it does at rest."]
+        lines += [
+            f"treatment : {{{', '.join(map(repr, spec.treatments))}}}",
+            "    Treatment of the friction at rest.",
+        ]
     lines += ["", "Returns", "-------", "Effect"]
     make.__name__ = make.__qualname__ = spec.name
     make.__doc__ = "\n".join(lines)
@@ -63,7 +70,7 @@ def __getattr__(name: str) -> Callable[..., Effect]:
     if name in _specs():
         made = globals()[name] = _constructor(_specs()[name])
         return made
-    raise AttributeError(f"no effect is called {name!r}; there are {', '.join(_specs())}")
+    raise AttributeError(f"no effect is called {name!r}; choose one of {', '.join(_specs())}")
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""Formulas, curves and surfaces as JSON, both ways."""
+"""Conversion of formulas, curves and surfaces to JSON and back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FORMULA = ("slot", "expression", "name", "title", "amplitudes", "parameters", "
 
 
 def to_dict(effect: Effect) -> dict[str, Any]:
-    """A formula, a curve or a surface as JSON knows it; :func:`from_dict` makes the same effect of it."""
+    """Convert a formula, a curve or a surface to JSON-ready values; :func:`from_dict` is the inverse."""
     spec = effect.made
     common = {"slot": effect.slots[0], "name": effect.name, "momentum": effect.momentum}
     if isinstance(spec, CurveSpec):
@@ -28,22 +28,22 @@ def to_dict(effect: Effect) -> dict[str, Any]:
         grid = np.reshape(effect.values, spec.shape).tolist()
         return {"surface": {**common, **where, "periodic": spec.periodic, "coefficients": grid}}
     if not isinstance(spec, FormulaSpec):
-        raise ModelError(f"{effect.name} is an effect of the library")
+        raise ModelError(f"{effect.name} is an effect of the library; write its name and parameters instead")
     ranges = {p.name: [None if np.isinf(x) else x for x in p.range] for p in spec.parameters}
     what = {"expression": spec.text, "title": spec.title, "amplitudes": list(effect.amplitudes)}
     return {"formula": {**common, **what, "ranges": ranges, "parameters": effect.parameters}}
 
 
 def from_dict(data: Mapping[str, Any]) -> Effect:
-    """The formula, curve or surface that :func:`to_dict`, or a person, wrote down.
+    """Make a formula, a curve or a surface from what :func:`to_dict` or a person wrote.
 
     Raises
     ------
     ModelError
-        Something is missing, unknown or unusable.
+        A key is missing, unknown or has an unusable value.
     """
     if len(table("an effect", data, ("formula", "curve", "surface"))) != 1:
-        raise ModelError(f"an effect of no library must be a formula, a curve or a surface, not {data!r}")
+        raise ModelError(f"expected one key, 'formula', 'curve' or 'surface', not {data!r:.80}")
     ((kind, content),) = data.items()
     try:
         if kind == "curve":
@@ -54,7 +54,7 @@ def from_dict(data: Mapping[str, Any]) -> Effect:
         momentum = given.pop("momentum", None)
         values = dict(given.pop("parameters", {}))
         limits: dict[str, Any] = {
-            name: tuple(own if x is None else x for x, own in zip(pair, UNLIMITED, strict=True))
+            name: tuple(unlimited if x is None else x for x, unlimited in zip(pair, UNLIMITED, strict=True))
             for name, pair in dict(given.pop("ranges", {})).items()
         }
         defaults: dict[str, Any] = {"name": "formula", "title": None, "amplitudes": None}

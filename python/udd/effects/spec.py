@@ -1,4 +1,4 @@
-"""Effects with their numbers, and what is said of them."""
+"""Effects, their parameter values, and their specifications."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from udd import _core
+from udd._util.keywords import renamed_attribute
 from udd._util.validation import number
 from udd.errors import ModelError
 
 __all__ = ["Effect", "Parameter", "Spec", "library"]
 
-#: What the core needs to know of a user's own effect: slot, formula, parameters, amplitudes.
-Own: TypeAlias = tuple[str, str, list[str], list[str]]
+#: Data for the core about a user-defined effect: slot, formula, parameters, amplitudes.
+CoreFormula: TypeAlias = tuple[str, str, list[str], list[str]]
 
-#: What stands in a formula for the smoothed sign of the speed.
+#: Symbols for the smoothed sign of the speed, by treatment.
 _SIGNS = {"set-valued": "Sgn(Omega)", "karnopp": "Karnopp(Omega, eps)", "lugre": "LuGre(Omega, eps)"}
 
 
@@ -31,17 +32,17 @@ class Parameter:
     name, unit : str
         The unit is SI, empty where dimensionless.
     default : float
-        The value taken where none is given.
+        The value if none is given.
     range : tuple of float
         The physically sensible range.
     role : str
-        ``"amplitude"`` (the effect is proportional to it and absent where all amplitudes are zero),
-        ``"shape"``, ``"frequency"``, ``"scanned"`` (a shape of which a search fits the best value alone), or
-        ``"width"``: over which a smoothed jump goes, of which a search keeps the best and tells none apart.
+        ``"amplitude"`` (the effect is proportional to it and absent if all amplitudes are zero), ``"shape"``,
+        ``"frequency"``, ``"scanned"`` (a shape whose value a search chooses by scores alone), or ``"width"``
+        (of a smoothed jump; a search keeps the best one but does not distinguish widths).
     grid : tuple of float
-        Values that a scan of candidates tries, for a shape.
+        Values of a shape that a scan of candidates tries.
     along : str
-        What a scanned number is: ``"angle"``, ``"speed"``, ``"power"`` or ``"duration"``.
+        Kind of a scanned number: ``"angle"``, ``"speed"``, ``"power"`` or ``"duration"``.
     """
 
     name: str
@@ -54,7 +55,7 @@ class Parameter:
 
     @property
     def sought(self) -> bool:
-        """Whether a fit that adds the effect finds it; not a shape that is one of a few whole numbers."""
+        """True if a fit that adds the effect estimates it; False for a shape with a few whole values."""
         if self.role == "width":
             return False
         if self.role == "shape":
@@ -62,41 +63,41 @@ class Parameter:
         return True
 
     def check(self, effect: str, value: object, *, strict: bool) -> float:
-        """The value as a float, within the range; amplitudes may leave it unless `strict`."""
+        """Return the value as a float, within the range; amplitudes may exceed it unless `strict`."""
         result = number(f"{self.name} of {effect}", value)
         low, high = self.range
         if (strict or self.role != "amplitude") and not low <= result <= high:
             unit = f" {self.unit}" if self.unit else ""
             raise ModelError(
-                f"{self.name} of {effect} must lie between {low:g} and {high:g}{unit}, not at {result:g}"
+                f"{self.name} of {effect} must be between {low:g} and {high:g}{unit}, not {result:g}"
             )
         return result
 
 
 @dataclass(frozen=True)
 class Spec:
-    """What is said of an effect beside its formula.
+    """Specification of an effect: names, meaning, and the equations that it enters.
 
     Attributes
     ----------
     name : str
         Its constructor's name in this module.
     title, equation, meaning : str
-        What a reader calls it, its formula, and what it would mean physically.
+        Its name for a reader, its formula, and its physical meaning.
     bodies : tuple of str
-        What it can act on: ``"disk"``, ``"pendulum"``.
+        Bodies that it can act on: ``"disk"``, ``"pendulum"``.
     slots : tuple of str
-        Where it enters the equations: ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``.
+        Places in the equations: ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``.
     momenta : tuple of str
-        How it may enter the angular momentum, the default first: ``"consistent"`` (the contact's
-        velocity and its rate of change exert a torque) or ``"constraint"`` (only the rolling constraint
-        changes, as in the paper). Empty for torque and friction.
+        Ways to enter the angular momentum, the default first: ``"consistent"`` (the contact's velocity and
+        its rate of change exert a torque) or ``"constraint"`` (only the rolling constraint changes, as in the
+        paper). Empty for torque and friction.
     treatments : tuple of str
-        What may become of dry friction's jump at rest, the default first: ``"smoothed"`` (over the width
-        `eps`; nothing sticks, but it can be fitted), ``"set-valued"`` (it sticks until the torque exceeds the
-        friction), ``"karnopp"`` (the same, and speeds below `eps` count as rest) or ``"lugre"`` (bristles
-        bend by about `eps`, in rad, before they slide; their deflection is one more state; for
-        :func:`udd.simulate` only). Empty for what is not dry friction.
+        Treatments of dry friction's jump at rest, the default first. ``"smoothed"`` uses the width `eps`:
+        nothing sticks, but it can be fitted. ``"set-valued"`` sticks until the torque exceeds the friction.
+        ``"karnopp"`` does the same, and speeds below `eps` count as rest. ``"lugre"`` has bristles that bend
+        by about `eps`, in rad, before they slide; their deflection is an additional state, for
+        :func:`udd.simulate` only. Empty for effects other than dry friction.
     parameters : tuple of Parameter
         In the order of the formula.
     """
@@ -113,32 +114,34 @@ class Spec:
 
     @property
     def shaped(self) -> bool:
-        """Whether a fit that adds the effect finds a shape of it too."""
+        """True if a fit that adds the effect also estimates a shape."""
         return any(p.sought and p.role in ("shape", "scanned") for p in self.parameters)
 
     def make(self, *, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
-        """The effect with these parameter values; the others take their defaults.
+        """Make the effect with these parameter values; the others take their defaults.
 
         Raises
         ------
         ModelError
-            An unknown parameter, a value outside its range, or a momentum or treatment that the effect
-            does not have.
+            A parameter is unknown, a value is outside its range, or the effect has no such momentum or
+            treatment.
         """
-        known = {p.name: p for p in self.parameters}
+        parameters = {p.name: p for p in self.parameters}
         for name in values:
-            if name not in known:
-                raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
+            if name not in parameters:
+                raise ModelError(f"{self.name} has no parameter {name!r}; it has {', '.join(parameters)}")
         given = tuple(p.check(self.name, values.get(p.name, p.default), strict=True) for p in self.parameters)
-        return Effect(self.name, given, momentum, treatment, self if self.own else None)
+        return Effect(self.name, given, momentum, treatment, self if self.core_formula else None)
 
     @property
-    def own(self) -> Own | None:
-        """What the core needs to know of an effect that is not of the library."""
+    def core_formula(self) -> CoreFormula | None:
+        """Data for the core about a user-defined effect; None for an effect of the library."""
         return None
 
+    own = renamed_attribute("own", "core_formula")
+
     def expression(self, values: Mapping[str, float], equation: str) -> str:
-        """The equation with these numbers put in."""
+        """Return the equation with these numbers inserted."""
 
         def put(match: re.Match[str]) -> str:
             value = values[match[0]]
@@ -149,13 +152,13 @@ class Spec:
         return left + equals + (re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, right) if names else right)
 
     def call(self, effect: Effect) -> tuple[str, list[str]]:
-        """The function that makes the effect, and its arguments as text."""
+        """Return the name of the function that makes the effect, and its arguments as text."""
         return self.name, [f"{name}={value!r}" for name, value in effect.parameters.items()]
 
 
 @functools.cache
 def _specs() -> Mapping[str, Spec]:
-    """The core's library by name."""
+    """Return the core's library by name."""
     specs = {}
     for entry in _core.effect_library():
         parameters = tuple(
@@ -171,7 +174,7 @@ def _specs() -> Mapping[str, Spec]:
 
 
 def library() -> tuple[Spec, ...]:
-    """Every effect that there is.
+    """List all effects of the library.
 
     Examples
     --------
@@ -186,32 +189,37 @@ def library() -> tuple[Spec, ...]:
 
 @dataclass(frozen=True, repr=False)
 class Effect:
-    """An effect with its numbers; made by the constructors of this module.
+    """Physical effect with its parameter values; made by the constructors of this module.
 
     Parameters
     ----------
     name : str
-        One of the library.
+        Name in the library.
     values : tuple of float
-        Parameter values in the library's order. Amplitudes may lie outside their physical range, as on
-        the way of a fit; shapes and frequencies may not.
+        Parameter values in the library's order. Amplitudes may be outside their physical range, as during a
+        fit; shapes and frequencies may not.
     momentum : str, optional
-        ``"consistent"`` or ``"constraint"``, where the effect has the choice; by default its first.
+        ``"consistent"`` or ``"constraint"``, if the effect has the choice; default: its first.
     treatment : str, optional
-        ``"smoothed"``, ``"set-valued"``, ``"karnopp"`` or ``"lugre"`` for dry friction; by default
-        the first. See :class:`Spec`.
+        ``"smoothed"``, ``"set-valued"``, ``"karnopp"`` or ``"lugre"`` for dry friction; default: the first.
+        See :class:`Spec`.
     made : Spec, optional
-        What is said of an effect that is not of the library.
+        Specification of an effect that is not of the library.
 
     Raises
     ------
     ModelError
-        An unknown name, a number that is not finite or out of range, a momentum or a treatment that does
-        not apply.
+            The name is unknown, a number is not finite or out of range, or a momentum or treatment does not
+            apply.
+
+    See Also
+    --------
+    library : list the effects.
+    formula, curve, surface : make an effect outside the library.
 
     Examples
     --------
-    A pendulum with dry friction comes to rest within the dead band, where friction holds it:
+    A pendulum with dry friction stops within the dead band, where friction keeps it at rest:
 
     >>> import udd
     >>> dry = udd.effects.coulomb(c=0.05, treatment="set-valued")
@@ -233,7 +241,7 @@ class Effect:
             if not isinstance(getattr(self, what), str | None):
                 raise ModelError(f"{what} of {self.name} must be a text, not {getattr(self, what)!r:.80}")
         if self.made is None and self.name not in _specs():
-            raise ModelError(f"no effect is called {self.name!r}; there are {', '.join(_specs())}")
+            raise ModelError(f"no effect is called {self.name!r}; choose one of {', '.join(_specs())}")
         spec = self.spec
         if len(self.values) != len(spec.parameters):
             raise ModelError(f"{self.name} takes {len(spec.parameters)} numbers, not {len(self.values)}")
@@ -254,43 +262,43 @@ class Effect:
 
     @property
     def spec(self) -> Spec:
-        """What is said of it."""
+        """Specification of the effect."""
         return self.made or _specs()[self.name]
 
     @property
     def title(self) -> str:
-        """What a reader calls it."""
+        """Name of the effect for a reader."""
         return self.spec.title
 
     @property
     def equation(self) -> str:
-        """Its formula."""
+        """Formula of the effect."""
         sign = _SIGNS.get(self.treatment or "", "tanh(Omega/eps)")
         return self.spec.equation.replace("tanh(Omega/eps)", sign)
 
     @property
     def meaning(self) -> str:
-        """What it means physically."""
+        """Physical meaning of the effect."""
         return self.spec.meaning
 
     @property
     def slots(self) -> tuple[str, ...]:
-        """Where it enters the equations."""
+        """Places in the equations that the effect enters."""
         return self.spec.slots
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Its parameters' values by name."""
+        """Parameter values by name."""
         return dict(zip((p.name for p in self.spec.parameters), self.values, strict=True))
 
     @property
     def amplitudes(self) -> tuple[str, ...]:
-        """The names of the parameters to which it is proportional."""
+        """Names of the parameters to which the effect is proportional."""
         return tuple(p.name for p in self.spec.parameters if p.role == "amplitude")
 
     @property
     def expression(self) -> str:
-        """Its formula with the numbers put in.
+        """Formula with the numbers inserted.
 
         Examples
         --------
@@ -301,12 +309,12 @@ class Effect:
         return self.spec.expression(self.parameters, self.equation)
 
     def replace(self, **values: float) -> Effect:
-        """The effect with other values of some parameters.
+        """Return the effect with other values of some parameters.
 
         Raises
         ------
         ModelError
-            An unknown parameter or a value that is not usable.
+            A parameter is unknown or a value is not usable.
         """
         new = self.parameters
         for name, value in values.items():

@@ -1,4 +1,4 @@
-"""Effects of no library: a formula of the user's, or a curve."""
+"""User-defined effects: formulas, curves and surfaces."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from udd._util.expressions import Expression, text_of
 from udd._util.validation import array, number
 from udd.errors import ModelError
 
-from .spec import Effect, Own, Parameter, Spec, _specs
+from .spec import CoreFormula, Effect, Parameter, Spec, _specs
 
 __all__ = ["curve", "formula", "surface"]
 
-#: Where each slot enters: the left side of an equation, the slot's unit, and what it would mean.
+#: Left side of the equation, unit and physical meaning of each slot.
 _SLOTS = {
     "torque": ("torque = ", "m^2/s^2", "a torque that the model lacks"),
     "friction": ("k = k_plain + ", "m^2/s", "the friction changes"),
     "lateral": ("u = ", "m/s", "the contact moves sideways"),
-    "vertical": ("W_c = W + ", "m/s", "the contact moves up or down beside the drive"),
+    "vertical": ("W_c = W + ", "m/s", "the contact moves up or down in addition to the drive"),
 }
 _MOMENTA = {"lateral": ("consistent", "constraint"), "vertical": ("consistent", "constraint")}
 
 
 @dataclass(frozen=True)
 class FormulaSpec(Spec):
-    """What is said of an effect that a user wrote: see :func:`formula`.
+    """Specification of a user's formula: see :func:`formula`.
 
     Attributes
     ----------
@@ -42,13 +42,13 @@ class FormulaSpec(Spec):
     text: str
 
     @property
-    def own(self) -> Own:
-        """What the core needs to know."""
+    def core_formula(self) -> CoreFormula:
+        """Data for the core: slot, formula, parameters, amplitudes."""
         names = [p.name for p in self.parameters]
         return self.slots[0], self.text, names, [p.name for p in self.parameters if p.role == "amplitude"]
 
     def call(self, effect: Effect) -> tuple[str, list[str]]:
-        """The function that makes the effect, and its arguments as text."""
+        """Return the name of the function that makes the effect, and its arguments as text."""
         items = [repr(self.slots[0]), repr(self.text)]
         if self.name != "formula":
             items.append(f"name={self.name!r}")
@@ -65,16 +65,16 @@ class FormulaSpec(Spec):
 
 @dataclass(frozen=True)
 class CurveSpec(FormulaSpec):
-    """What is said of a curve: see :func:`curve`.
+    """Specification of a curve: see :func:`curve`.
 
     Attributes
     ----------
     coordinate : str
-        What the curve is a function of.
+        Coordinate of the curve.
     low, high : float
-        Where it begins and ends.
+        Its ends.
     periodic : bool
-        Whether it begins anew where it ends.
+        Whether its end is joined to its beginning.
     """
 
     coordinate: str
@@ -84,16 +84,16 @@ class CurveSpec(FormulaSpec):
 
     @property
     def cells(self) -> int:
-        """How many stretches there are between its knots."""
+        """Number of intervals between the knots."""
         return len(self.parameters) - (0 if self.periodic else 3)
 
     @property
     def step(self) -> float:
-        """The distance of its knots."""
+        """Distance between knots."""
         return (self.high - self.low) / self.cells
 
     def basis(self, x: ArrayLike) -> NDArray[np.float64]:
-        """The curve's values for each coefficient alone.
+        """Compute the curve's basis functions: its values for each coefficient alone.
 
         Parameters
         ----------
@@ -115,14 +115,14 @@ class CurveSpec(FormulaSpec):
         return result
 
     def expression(self, values: Mapping[str, float], equation: str) -> str:
-        """The curve by its values at the knots."""
+        """Describe the curve by its values at the knots."""
         knots = self.low + self.step * np.arange(self.cells if self.periodic else self.cells + 1)
         at = self.basis(knots) @ np.array(list(values.values()))
         shown = ", ".join(f"s({x:.4g}) = {value:.4g}" for x, value in zip(knots, at, strict=True))
         return f"{equation}, {shown}"
 
     def call(self, effect: Effect) -> tuple[str, list[str]]:
-        """The function that makes the effect, and its arguments as text."""
+        """Return the name of the function that makes the effect, and its arguments as text."""
         where = [repr(self.slots[0]), repr(self.coordinate), repr(self.low), repr(self.high)]
         items = [*where, repr(list(effect.values))]
         if self.periodic:
@@ -134,18 +134,18 @@ class CurveSpec(FormulaSpec):
 
 @dataclass(frozen=True)
 class SurfaceSpec(FormulaSpec):
-    """What is said of a surface: see :func:`surface`.
+    """Specification of a surface: see :func:`surface`.
 
     Attributes
     ----------
     coordinates : tuple of str
-        What the surface is a function of.
+        Coordinates of the surface.
     low, high : tuple of float
-        Where it begins and ends.
+        Its ends along each.
     shape : tuple of int
-        How many coefficients there are along each coordinate.
+        Number of coefficients along each coordinate.
     periodic : bool
-        Whether it begins anew where it ends along the second coordinate.
+        Whether its end is joined to its beginning along the second coordinate.
     """
 
     coordinates: tuple[str, str]
@@ -155,11 +155,11 @@ class SurfaceSpec(FormulaSpec):
     periodic: bool
 
     def expression(self, values: Mapping[str, float], equation: str) -> str:
-        """The surface in words: its numbers are too many to read."""
+        """Describe the surface in words: its numbers are too many to read."""
         return equation
 
     def call(self, effect: Effect) -> tuple[str, list[str]]:
-        """The function that makes the effect, and its arguments as text."""
+        """Return the name of the function that makes the effect, and its arguments as text."""
         grid = np.reshape(effect.values, self.shape).tolist()
         items = [repr(v) for v in (self.slots[0], self.coordinates, self.low, self.high, grid)]
         if self.periodic:
@@ -184,54 +184,60 @@ def formula(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     **parameters: float,
 ) -> Effect:
-    """An effect given as a formula.
+    """Make an effect from a formula.
 
     Parameters
     ----------
     slot : {"torque", "friction", "lateral", "vertical"}, the rate of a state, or a force
-        What the formula adds to: the torque [m^2/s^2], the friction coefficient k [m^2/s], the contact's
-        lateral velocity u or its vertical velocity W_c [m/s]. Of a user's own model, the rate of a state:
-        ``"v'"``; its formula may use the model's states and parameters. Where that model has a mass matrix,
-        also a force along a coordinate, ``"force(x)"``, or between two, ``"force(b - a)"``: on b, and its
-        reaction on a. Where it has measured inputs, the delay of one, ``"delay(u)"``: the formula is then
-        one parameter.
+        The equation that the formula is added to: the torque [m^2/s^2], the friction coefficient k [m^2/s],
+        the contact's lateral velocity u or its vertical velocity W_c [m/s]. For a user's own model: the rate
+        of a state, ``"v'"``; the formula may then use the model's states and parameters. If that model has a
+        mass matrix, also a force along a coordinate, ``"force(x)"``, or between two, ``"force(b - a)"``: on
+        b, with its reaction on a. If it has measured inputs, the delay of one, ``"delay(u)"``: the formula is
+        then one parameter.
     expression : str or SymPy expression
-        Of the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain model's
-        friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's ``length``),
-        numbers, ``pi``, and the effect's own parameters; with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``,
-        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``,
-        ``sign``, ``min(a, b)``, ``max(a, b)``, ``where(x > c, a, b)``, ``bspline`` (the cardinal cubic
-        B-spline) and the splines of :func:`curve`. Runs of disk and pendulum land where ``abs(Omega)``
-        changes, those of a model of your own on all kinks (see :class:`udd.Model`); other kinks of an effect
-        on disk or pendulum are only compared: runs go over them by small steps, without a power series.
+        It may use the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain
+        model's friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's
+        ``length``), numbers, ``pi``, and the effect's parameters. Operators and functions: ``+ - * / ^``,
+        ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``,
+        ``atan2(y, x)``, ``abs``, ``sign``, ``min(a, b)``, ``max(a, b)``, ``where(x > c, a, b)``, ``bspline``
+        (the cardinal cubic B-spline) and the splines of :func:`curve`. Runs of disk and pendulum locate the
+        kink of ``abs(Omega)``, those of a user's own model all kinks (see :class:`udd.Model`). Runs of disk
+        and pendulum cross other kinks by small steps, without a power series.
     momentum : {"consistent", "constraint"}, optional
-        How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
+        Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str
-        What its parameters are called after: ``name.parameter``.
+        Prefix of its parameters' names: ``name.parameter``.
     title : str, optional
-        What a reader calls it; by default its name.
+        Name for a reader; default: `name`.
     amplitudes : iterable of str, optional
-        The parameters to which the formula is proportional, taken together; by default all.
+        The parameters to which the formula is proportional, taken together; default: all.
     ranges : mapping of str to (low, high), optional
         The physically sensible ranges of parameters.
     **parameters : float
-        The effect's own parameters.
+        Values of the effect's parameters.
 
     Returns
     -------
     Effect
+        With `expression`, `parameters` and `amplitudes`; pass it to a model as ``effects=``.
 
     Raises
     ------
     ModelError
-        A name that the formula may not use, a formula that is not proportional to its amplitudes, or a
-        parameter that it does not use.
+            The formula uses an unknown name, is not proportional to its amplitudes, or does not use a
+            parameter.
+
+    See Also
+    --------
+    curve : an effect as a spline over one coordinate.
+    surface : an effect as a spline over two coordinates.
 
     Notes
     -----
     The text is parsed to a list of operations, which the core evaluates as it does the library's effects;
-    nothing in it is executed. ``abs(Omega)`` may have its kink: the integrator lands there. At other kinks it
-    does not, and jumps are none of a formula's.
+    nothing in it is executed. The integrator locates the kink of ``abs(Omega)``, but no other kinks; a
+    formula must not jump.
 
     Examples
     --------
@@ -256,14 +262,17 @@ def written(
     ranges: Mapping[str, tuple[float, float]] | None,
     names: tuple[str, ...],
 ) -> FormulaSpec:
-    """What is said of a formula."""
+    """Make the specification of a formula."""
     _word(name)
     linear = names if amplitudes is None else _names(amplitudes)
     limits = dict(ranges or {})
     for other in (*linear, *limits):
         if other not in names:
             raise ModelError(f"{name} has no parameter {other!r}; it has {', '.join(names) or 'none'}")
-    listed = tuple(_parameter(name, own, "", own in linear, limits.get(own, UNLIMITED)) for own in names)
+    listed = tuple(
+        _parameter(name, parameter, "", parameter in linear, limits.get(parameter, UNLIMITED))
+        for parameter in names
+    )
     text = text_of("the formula", expression)
     return FormulaSpec(*_described(slot, name, title or name, text, text, listed), listed, text)
 
@@ -280,42 +289,49 @@ def curve(
     momentum: str | None = None,
     name: str = "curve",
 ) -> Effect:
-    """An effect given as a curve: a cubic spline over one coordinate.
+    """Make an effect from a curve: a cubic spline over one coordinate.
 
     Parameters
     ----------
     slot : {"torque", "friction", "lateral", "vertical"}
-        What the curve adds to; see :func:`formula`.
+        The equation that the curve is added to; see :func:`formula`.
     coordinate : str or SymPy expression
-        What it is a function of: ``"Omega"``, ``"Y"``, ``"Z"``, ``"beta"``, ``"t"`` or any formula, such as
+        Coordinate of the curve: ``"Omega"``, ``"Y"``, ``"Z"``, ``"beta"``, ``"t"`` or any formula, such as
         ``"sqrt(Y^2 + Z^2)"``.
     low, high : float
-        Where it begins and ends. Beyond, it keeps its last value.
+        Its ends. Beyond them it is constant.
     coefficients : array_like, shape (n,)
-        At least four; they are the parameters ``c0``, ``c1``, ..., all amplitudes.
+        At least four. They become the parameters ``c0``, ``c1``, ..., all amplitudes.
     periodic : bool
-        Whether it begins anew where it ends, as over an angle from 0 to 2 pi.
+        Whether its end is joined to its beginning, as over an angle from 0 to 2 pi.
     momentum : {"consistent", "constraint"}, optional
-        How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
+        Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str
-        What its parameters are called after.
+        Prefix of its parameters' names.
 
     Returns
     -------
     Effect
+        With one amplitude for each coefficient.
 
     Raises
     ------
     ModelError
-        A coordinate that there is not, fewer than four coefficients, or a range that is none.
+            The coordinate is unknown, there are fewer than four coefficients, or `low` is not below `high`.
+
+    See Also
+    --------
+    formula : an effect as a formula.
+    surface : an effect as a spline over two coordinates.
+    udd.plot.curve : draw a fitted curve.
 
     Notes
     -----
-    The curve is ``sum of c[i] B((x - low)/h + 1 - i)`` with the cardinal cubic B-spline ``B`` and
-    ``h = (high - low)/(n - 3)``: every cubic spline with these knots from `low` to `high`. A periodic one has
-    ``h = (high - low)/n`` and begins anew with ``c[0]`` after ``c[n - 1]``. Second derivatives are
-    continuous, but where the curve ends. In formulas it is ``spline(x, low, high, c0, c1, ...)`` and
-    ``periodic(...)``.
+    The curve is ``sum of c[i] B((x - low)/h + 1 - i)`` with the cardinal cubic B-spline ``B`` and ``h = (high
+    - low)/(n - 3)``. Every cubic spline with these knots from `low` to `high` has this form (C. de Boor, "A
+    Practical Guide to Splines", Springer 1978). A periodic curve has ``h = (high - low)/n`` and continues
+    with ``c[0]`` after ``c[n - 1]``. Second derivatives are continuous except at the ends of the curve. In
+    formulas it is ``spline(x, low, high, c0, c1, ...)`` and ``periodic(...)``.
 
     Examples
     --------
@@ -351,34 +367,39 @@ def surface(
     momentum: str | None = None,
     name: str = "surface",
 ) -> Effect:
-    """An effect given as a surface: a cubic spline over two coordinates.
+    """Make an effect from a surface: a cubic spline over two coordinates.
 
     Parameters
     ----------
     slot : {"torque", "friction", "lateral", "vertical"}
-        What the surface adds to; see :func:`formula`.
+        The equation that the surface is added to; see :func:`formula`.
     coordinates : pair of str or SymPy expression
-        What it is a function of, as for :func:`curve`.
+        Coordinates of the surface, as for :func:`curve`.
     low, high : pair of float
-        Where it begins and ends along each. Beyond, it fades within three knots along the first coordinate,
-        and keeps its last value along the second.
+        Its ends along each. Beyond them it decays to zero within three knots along the first coordinate, and
+        is constant along the second.
     coefficients : array_like, shape (m, n)
-        At least four along each; they are the parameters ``c0``, ``c1``, ... row by row, all amplitudes.
+        At least four along each. They become the parameters ``c0``, ``c1``, ... row by row, all amplitudes.
     periodic : bool
-        Whether it begins anew where it ends along the second coordinate, as over an angle.
+        Whether its end is joined to its beginning along the second coordinate, as over an angle.
     momentum : {"consistent", "constraint"}, optional
-        How a lateral or vertical effect enters the angular momentum; see :class:`Spec`.
+        Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str
-        What its parameters are called after.
+        Prefix of its parameters' names.
 
     Returns
     -------
     Effect
+        With one amplitude for each coefficient.
 
     Raises
     ------
     ModelError
-        A coordinate that there is not, too few coefficients, or a range that is none.
+            A coordinate is unknown, there are too few coefficients, or `low` is not below `high`.
+
+    See Also
+    --------
+    curve : an effect as a spline over one coordinate.
 
     Notes
     -----
@@ -399,7 +420,7 @@ def surface(
     if values.ndim != 2 or min(values.shape) < 4:
         raise ModelError("a surface needs a table of coefficients, at least four along each coordinate")
     if any(isinstance(pair, str) or len(pair) != 2 for pair in (coordinates, low, high)):
-        raise ModelError("a surface needs two coordinates, and where each begins and ends")
+        raise ModelError("a surface needs two coordinates, two values of low and two of high")
     first = tuple(number("low", v) for v in low)
     last = tuple(number("high", v, above=a) for v, a in zip(high, first, strict=True))
     listed = _coefficients(slot, name, values.size)
@@ -427,7 +448,7 @@ _MOST_COEFFICIENTS = 2000  # their formula has 10,000 characters
 
 
 def _coefficients(slot: str, name: str, count: int) -> tuple[Parameter, ...]:
-    """The parameters of a spline: its coefficients, all amplitudes, in the slot's unit."""
+    """Make the parameters of a spline: its coefficients, all amplitudes, in the slot's unit."""
     _slot(slot)
     if count > _MOST_COEFFICIENTS:
         raise ModelError(f"a spline has at most {_MOST_COEFFICIENTS} coefficients, not {count}")
@@ -436,27 +457,27 @@ def _coefficients(slot: str, name: str, count: int) -> tuple[Parameter, ...]:
 
 
 def is_spline(effect: Effect) -> bool:
-    """Whether an effect is a curve or a surface, whose many numbers say nothing to a reader."""
+    """Return True if an effect is a curve or a surface, whose many numbers mean nothing to a reader."""
     return isinstance(effect.spec, CurveSpec | SurfaceSpec)
 
 
 def _described(
     slot: str, name: str, title: str, shown: str, text: str, parameters: tuple[Parameter, ...]
 ) -> tuple[str, str, str, str, tuple[str, ...], tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """The checked attributes of a spec before its parameters."""
+    """Return the checked attributes of a specification before its parameters."""
     _slot(slot)
     _word(name)
     if name in _specs():
-        raise ModelError(f"the library has an effect called {name!r} already: give the formula another name")
-    known = _SLOTS.get(slot)
-    left, _unit, meaning = known or (f"{slot} = ... + ", "", f"the rate {slot} has one more term")
+        raise ModelError(f"the library already has an effect {name!r}: give the formula another name")
+    entry = _SLOTS.get(slot)
+    left, _unit, meaning = entry or (f"{slot} = ... + ", "", f"the rate {slot} has one more term")
     if along_of(slot):
         left, meaning = f"{slot} = ", "a force that enters every acceleration through the mass matrix"
     if delayed_by(slot):
-        left, meaning = f"{slot} = ", "the input is felt later than it was measured"
+        left, meaning = f"{slot} = ", "the input acts later than it was measured"
     names = [p.name for p in parameters]
     linear = [p.name for p in parameters if p.role == "amplitude"]
-    # Of a user's own model only the model knows the states.
+    # For a user's own model only the model knows the states.
     bodies = tuple(_core.formula_bodies(name, (slot, text, names, linear))) if slot in _SLOTS else ("own",)
     return name, title, left + shown, meaning, bodies, (slot,), _MOMENTA.get(slot, ()), ()
 
@@ -465,19 +486,20 @@ def _slot(slot: str) -> None:
     rate = isinstance(slot, str) and slot.endswith("'") and slot[:-1].isidentifier()
     if slot not in _SLOTS and not rate and not along_of(slot) and not delayed_by(slot):
         raise ModelError(
-            f"the slot must be one of {', '.join(_SLOTS)}, or for a model of your own the rate of a state as "
-            f'in "v\'", a force as in "force(x)" or a delay as in "delay(u)", not {slot!r}'
+            f'the slot must be one of {", ".join(_SLOTS)}; for a model of your own also a rate "v\'", a '
+            "force "
+            f'"force(x)" or a delay "delay(u)", not {slot!r:.80}'
         )
 
 
 def along_of(slot: object) -> str | None:
-    """What a slot that is a force acts along: a coordinate, or the difference of two; None for any other."""
+    """Return the coordinate, or the difference of two, along which a force acts; None for another slot."""
     match = re.fullmatch(r"force\((\w+(?: - \w+)?)\)", slot) if isinstance(slot, str) else None
     return match[1] if match else None
 
 
 def delayed_by(slot: object) -> str | None:
-    """The input that a slot lets be felt later; None for any other."""
+    """Return the input that a slot delays; None for another slot."""
     match = re.fullmatch(r"delay\((\w+)\)", slot) if isinstance(slot, str) else None
     return match[1] if match else None
 
@@ -499,7 +521,9 @@ def _parameter(effect: str, name: str, unit: str, linear: bool, limits: tuple[fl
     except (TypeError, ValueError, OverflowError):
         raise ModelError(f"the range of {name} must be two numbers, not {limits!r}") from None
     if not low <= high:
-        raise ModelError(f"the range of {name} of {effect} must go upwards, not from {low} to {high}")
-    # What is taken where no value is given must not depend on the values.
+        raise ModelError(
+            f"the range of {name} of {effect} must be (low, high) with low <= high, not ({low}, {high})"
+        )
+    # The default must not depend on the given values.
     default = min(max(0.0, low), high)
     return Parameter(name, unit, default, (low, high), "amplitude" if linear else "shape", ())

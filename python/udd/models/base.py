@@ -13,7 +13,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed_attribute
 from udd._util.validation import array, number
 from udd.effects import Effect
-from udd.effects.spec import Own
+from udd.effects.spec import CoreFormula
 from udd.errors import ModelError
 
 from .profile import ModelProfile
@@ -167,9 +167,11 @@ class Model:
         return dict(_core.model_parameters(self)) | own
 
     @property
-    def _spec(self) -> tuple[str, list[float], list[tuple[str, str | None, str | None, Own | None]], bool]:
+    def _spec(
+        self,
+    ) -> tuple[str, list[float], list[tuple[str, str | None, str | None, CoreFormula | None]], bool]:
         """What the core needs to know."""
-        effects = [(e.name, e.momentum, e.treatment, e.spec.own) for e in self.effects]
+        effects = [(e.name, e.momentum, e.treatment, e.spec.core_formula) for e in self.effects]
         return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
 
     @checked_arguments

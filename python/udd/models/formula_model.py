@@ -569,17 +569,19 @@ def _check_delay(effect: Effect, delayed: str, inputs: Sequence[str], late: Sequ
         raise ModelError(f"{effect.name} delays {delayed}, but the model's inputs are {known}")
     if delayed in late:
         raise ModelError(f"the input {delayed} has a delay already: {effect.name} would be a second one")
-    if effect.spec.own is None or [effect.spec.own[1]] != list(effect.amplitudes):
+    if effect.spec.core_formula is None or [effect.spec.core_formula[1]] != list(effect.amplitudes):
         raise ModelError(f"the delay {effect.name} must be one parameter, not a formula")
 
 
 def _written(effect: Effect) -> str:
     """An effect's formula with its parameters as the core calls them."""
-    assert effect.spec.own is not None
+    assert effect.spec.core_formula is not None
     if not effect.parameters:
-        return effect.spec.own[1]
+        return effect.spec.core_formula[1]
     names = "|".join(map(re.escape, effect.parameters))
-    return re.sub(rf"(?<![\w.])(?:{names})(?!\w)", rf"{effect.name}{_POINT}\g<0>", effect.spec.own[1])
+    return re.sub(
+        rf"(?<![\w.])(?:{names})(?!\w)", rf"{effect.name}{_POINT}\g<0>", effect.spec.core_formula[1]
+    )
 
 
 def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> tuple[tuple[str, ...], ...]:
