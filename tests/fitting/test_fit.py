@@ -188,7 +188,7 @@ def test_a_wrapped_angle_is_followed():
         ({"free": ["k9"]}, "no parameter 'k9'"),
         ({"camera": ["focus"]}, "no parameter 'focus'"),
         ({"priors": {"R": (0.08, 0.001)}}, "R, which is not free"),
-        ({"priors": {"k0": (0.01, 0.0)}}, "must be positive"),
+        ({"priors": {"k0": (0.01, 0.0)}}, "positive standard deviation"),
         ({"priors": {"k0": 3}}, "a mean and a standard deviation"),
         ({"free": "k0"}, r'free must be a list of names, not a name: free=\["k0"\]'),
         ({"camera": "tilt"}, r'camera must be a list of names, not a name: camera=\["tilt"\]'),

@@ -65,7 +65,7 @@ def test_records_have_drives_and_clocks_of_their_own() -> None:
 def test_what_is_lacking_is_named() -> None:
     measured = record(3)
     bare = udd.Measurement(measured.t, {"q": measured["q"]})
-    with pytest.raises(FitError, match="lacks the model's input u; its inputs are none"):
+    with pytest.raises(FitError, match="lacks the model's input u; its inputs are: none"):
         udd.fit(bare, ARM)
     short = udd.Measurement(
         measured.t, {"q": measured["q"]}, inputs={"u": udd.InputSignal([0.0, 1.0], [0.0, 1.0])}

@@ -234,7 +234,7 @@ def test_a_column_that_is_hardly_there_is_told(few: int) -> None:
     values = np.cos(T)
     other = np.where(np.arange(len(T)) < few, -np.sin(T), np.nan)
     swing = udd.Model(["a", "b"], ["b", "-k*a"], {"k": 1.0})
-    with pytest.raises(FitError, match=f"b was seen in {few} rows; a column needs at least 10"):
+    with pytest.raises(FitError, match=f"b was observed in {few} rows; a column needs at least 10"):
         udd.fit(udd.Measurement(T, {"a": values, "b": other}), swing)
 
 

@@ -39,15 +39,15 @@ def test_of_several_measurements_each_may_have_its_own():
     record = record_of(twice, KNOWN, starts)
     first = [record.states[record.film == k][0, 2] for k in range(2)]
     assert first == [22.0, 10.0]
-    with pytest.raises(FitError, match="there are 2 measurements but 1 starts"):
+    with pytest.raises(FitError, match="got 2 measurements but 1 starts"):
         record_of(twice, KNOWN, starts[:1])
 
 
 @pytest.mark.parametrize(
     ("start", "said"),
     [
-        ({"w": 1.0}, "a start is given for 'w', but the states are x, y, z"),
-        ({"z": "high"}, "the start of z must be a finite number, not 'high'"),
+        ({"w": 1.0}, "state0 has 'w', but the states are x, y, z"),
+        ({"z": "high"}, "the start value of z must be a finite number, not 'high'"),
         ([1.0], "state0 must be a table"),
     ],
 )

@@ -111,7 +111,7 @@ def test_numbers_that_cannot_be_a_pendulums_are_asked_about(factors):
 def test_an_angle_in_degrees_that_may_be_one_in_rad_is_a_remark():
     """Three degrees: less than half a turn if it were in rad. The fit is that of the numbers as stated."""
     found, said = fitted(scaled(swing(0.05), theta=180 / np.pi), udd.Pendulum(0.8, k0=0.02))
-    assert "whose angle is in degrees, not in rad; the fit goes on as stated" in said
+    assert "whose angle is in degrees, not in rad; the fit continues with the given units" in said
     assert found is not None and "degrees" in found.unit_doubt
     assert any("degrees" in line for line in found.doubts.sentences) and "degrees" in found.summary()
 
@@ -138,7 +138,7 @@ def test_wrong_units_are_refused_on_the_last_part_of_a_record(monkeypatch: pytes
     loosest = module._loosest
     monkeypatch.setattr(module, "_loosest", noted)
     _found, said = fitted(measured, udd.Pendulum(0.8, k0=0.02))
-    assert "the fit goes on as stated" in said
+    assert "the fit continues with the given units" in said
     # Lengths of another decade are fitted to 100 frames alone, and what swings between frames not at all.
     assert {frames for length, frames in lengths if length != 0.8} == {100}
     assert min(length for length, _frames in lengths) == pytest.approx(0.008)

@@ -318,7 +318,7 @@ def test_camera_parameters_are_explained_where_they_appear() -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
     text = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0)).summary()
     assert "zero of the angle" in text
-    assert "pivot above where it was taken to be, in lengths of the pendulum" in text
+    assert "pivot above the assumed one, in lengths of the pendulum" in text
 
 
 def test_contents_guide_and_data_are_on_the_page(pages: dict[str, str]) -> None:

@@ -1,4 +1,4 @@
-"""The loop's first half: what the model's numbers are, given measured motion."""
+"""Estimate a model's parameters and states from measured motion."""
 
 from __future__ import annotations
 

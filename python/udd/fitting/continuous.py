@@ -1,4 +1,4 @@
-"""Measurements as a fit needs them: with continuous angles, and times that are not rounded."""
+"""Prepare measurements for a fit: continuous angles, and times without rounding."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def angles_of(model: Any) -> tuple[str, ...]:
 
 
 def continuous(measurement: Any, model: Any) -> Any:
-    """Make angles continuous and a rounded clock steady, of one measurement or of several.
+    """Make angles continuous and a rounded clock steady, for one measurement or for several.
 
-    The model, one for all or one each, says which columns are angles. A column that jumps by a turn without
-    being an angle of the model is reported, and not changed. Any other object is returned as it is: a fit
-    refuses it.
+    The model (one for all, or one for each) says which columns are angles. A column that jumps by a turn but
+    is no angle of the model is reported and not changed. Any other object is returned as it is: a fit refuses
+    it.
     """
     if isinstance(measurement, Measurement):
         if isinstance(model, Sequence):
@@ -36,8 +36,8 @@ def continuous(measurement: Any, model: Any) -> Any:
         left = wrapped_columns(result)
         if left and isinstance(model, FormulaModel):
             warnings.warn(
-                f"{left[0]} jumps by a turn, as an angle within one turn does, but is no angle of the model: "
-                f'its jumps count as motion. If it is an angle, say angles=["{left[0]}"] in udd.Model.',
+                f"{left[0]} jumps by a turn, as an angle does, but is no angle of the model: the jumps count "
+                f'as motion. If it is an angle, pass angles=["{left[0]}"] to udd.Model.',
                 stacklevel=outside(),
             )
         return result
@@ -46,11 +46,11 @@ def continuous(measurement: Any, model: Any) -> Any:
     models = model if isinstance(model, Sequence) else [model] * len(measurement)
     if len(models) != len(measurement):
         return measurement
-    return [continuous(one, own) for one, own in zip(measurement, models, strict=True)]
+    return [continuous(part, each) for part, each in zip(measurement, models, strict=True)]
 
 
 def steady(measurement: Measurement) -> Measurement:
-    """Undo the rounding of times of a constant rate; inputs that were sampled with the rows go with them."""
+    """Undo the rounding of times of a constant rate, for the rows and for inputs sampled with them."""
     clock = steady_clock(measurement.t)
     if clock is None:
         return measurement

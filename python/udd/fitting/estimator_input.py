@@ -1,4 +1,4 @@
-"""What the core's estimator reads, each by the names of its attributes: record, point and unknowns."""
+"""Inputs of the core's estimator, which reads them by attribute name: record, point and unknowns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class FilmParameters(NamedTuple):
-    """What holds for one film: values of the model's and the camera's parameters, and the clock's error."""
+    """Parameters of one film: the model's values, the camera's values and the clock's error."""
 
     model: list[float]
     camera: list[float]
@@ -38,12 +38,12 @@ class Observations:
         Times of the frames, s.
     seen : ndarray (n, m)
     information : ndarray (n, m, m)
-        The inverse of each frame's noise covariance; zero where nothing was seen.
+        The inverse of each frame's noise covariance; zero if nothing was observed.
     linked : ndarray of bool (n - 1,)
         Whether the model leads from a frame to the next.
     film : ndarray of int (n,)
     autocorrelation : list of float (m,)
-        Of each channel's noise from one frame to the next.
+        Lag-1 autocorrelation of each channel's noise.
     """
 
     t: Array
@@ -55,7 +55,7 @@ class Observations:
 
     @classmethod
     def of(cls, record: Record, noise: Noise, omega: Array) -> Observations:
-        """A record with this noise, which may grow with the angular speed `omega` (n,), rad/s."""
+        """Combine a record with its noise, which may grow with the angular speed `omega` (n,), rad/s."""
         information = noise.information(record, omega)
         return cls(record.t, record.seen, information, record.linked, record.film, noise.memory.tolist())
 
@@ -72,9 +72,9 @@ class EstimatorInput:
     films : sequence of FilmParameters
     free : sequence of Free
     diffusion : sequence of float (d,)
-        The model's assumed error, per square root of a second.
+        The assumed model error, per square root of a second.
     linear : Linearised, optional
-        What a solve left at this point.
+        The linearisation that a solve computed at this point.
     """
 
     model: Model

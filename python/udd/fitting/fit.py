@@ -1,4 +1,4 @@
-"""The fit of a model to a measurement: weak-constraint multiple shooting."""
+"""Fit a model to a measurement by weak-constraint multiple shooting."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from udd.models.formula_model import FormulaModel
 from .continuous import continuous
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
-from .input_noise import LEVELS_APART, diffusion_by_noise
+from .input_noise import LEVEL_RATIO, diffusion_by_noise
 from .model_error_schedule import ANY, FEW, LEAP, ROUGH, Goal, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera, names_of
@@ -32,16 +32,19 @@ from .solve import MOST, SolveError, solve
 from .units import Scale, ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
-_FAR = 10.0  # standard deviations from what was stated: the fit is one of something else
+_RUNAWAY_SD = 10.0  # standard deviations from the given value: the fit describes another device
 #: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
 UNEXPLAINED = 2.5
-_OFF = 3.0  # times the drive that was stated: more than what is missing does
-_PACE = 2.0  # times a pendulum's stated ratio of length to inertia
-#: Of what a camera's noise is taken to be: computed motion has none, and would weigh without bound.
+_MAX_DRIVE_RATIO = 3.0  # ratio to the given drive that no missing effect explains
+_MAX_FREQUENCY_RATIO = 2.0  # ratio to a pendulum's given length over inertia
+#: Lower limit of the noise, as a share of a camera's assumed noise: computed motion has no noise, and its
+#: weights would have no bound.
 _FINEST = 1e-3
-_BELIEVED = 3.0  # a measurement's own errors are good to this factor; what is larger is the model's fault
+# factor by which a measurement's stated errors may be too small; a larger misfit is the model's fault
+_BELIEVED = 3.0
 
-#: What misfits show: the noise, next to nothing where the states follow every frame, or the model's faults.
+#: Source of the misfits: the noise; almost nothing, because the states follow every frame; or the model's
+#: faults.
 Misfits = Literal["noise", "little", "faults"]
 
 
@@ -58,53 +61,68 @@ def fit(
 ) -> Fit:
     """Fit a model to measured motion.
 
-    Unknown are the state at every frame, the model's free parameters and the camera's; minimised is the sum
-    of the squared misfits in units of the noise and of the squared model errors in units of an assumed one,
-    which is lowered in steps (weak-constraint multiple shooting). No data are differentiated, and chaotic
-    records of any length can be fitted. The model's time counts from the measurement's first row.
+    The unknowns are the state at every frame, the model's free parameters and the camera's. The fit minimises
+    the squared misfits in units of the noise, plus the squared model errors in units of an assumed model
+    error. It reduces that assumed error in steps (weak-constraint multiple shooting). No data are
+    differentiated, and chaotic records of any length can be fitted. The model's time counts from the
+    measurement's first row.
 
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
-        Of the disk (``Y, Z, beta``) or of a pendulum (``theta``), or of states of a user's own model, by
-        their names. Several are fitted jointly: they share the device's parameters.
+        Motion of the disk (``Y, Z, beta``), of a pendulum (``theta``), or of states of a user's own model, by
+        name. Several measurements are fitted jointly: they share the device's parameters.
     model : Disk, Pendulum or a user's own Model, or a sequence of them
-        Its parameters are the start and the priors' means. For several measurements one each, alike but for
-        their parameters' values, or one for all.
+        Its parameters are the start values and the means of the priors. With several measurements: one model
+        for all, or one for each that differs only in parameter values.
     free : iterable of str, optional
-        Names of the model's free parameters; by default ``k0, k1, k2, W`` (with a prior of 5 %) of a disk,
-        ``k0, length, inertia`` of a pendulum, and the amplitudes of all effects; all of a user's own model.
+        Names of the model's free parameters. Default: ``k0, k1, k2, W`` (with a prior of 5 %) for a disk,
+        ``k0, length, inertia`` for a pendulum, in both cases with the amplitudes of all effects; all
+        parameters of a user's own model.
     camera : bool or iterable of str
-        Whether the camera's parameters are free (pivot ``y0, z0``, ``tilt``, ``scale``, the marks' centre
-        ``right, up`` of the disk's, ``lag`` of the orientation, ``row`` time of a rolling shutter,
-        ``shutter`` for means over an exposure, ``lens``, ``clock``; of a pendulum ``theta0, aside, above``),
-        or which of them. Of a pendulum that an encoder read only the zero ``theta0`` is:
-        the measurement says ``sensor = encoder`` (in its `meta`, or a line of its file), or its angles come
-        in steps that drown all other noise.
+        Whether the camera's parameters are free, or the names of those that are. A disk has the pivot ``y0,
+        z0``, ``tilt``, ``scale``, the marks' centre ``right, up`` relative to the disk's, ``lag`` of the
+        orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens`` and
+        ``clock``. A pendulum has ``theta0, aside, above``; if an encoder read it, only the zero ``theta0``.
+        An encoder is assumed if the measurement says ``sensor = encoder`` (in its `meta`, or a line of its
+        file), or if its angles come in steps larger than all other noise.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional
-        The model's parameters that every measurement has a value of its own of; by default the drive ``W``.
-        They are called ``W[0]``, ``W[1]`` ... then, as the camera's are.
+        Parameters of the model with a separate value for every measurement; default: the drive ``W``.
+        They are then called ``W[0]``, ``W[1]`` ..., as the camera's are.
     state0 : mapping of str to float, optional
-        Where states of your own model that are not seen start, by their names; of several measurements also a
-        list of such tables. The search for them begins with the motion from there, driven by what was seen.
-        Without it a state begins at the rate, or the integral, of what is seen; one whose law is undefined or
-        flat below zero at the size of what is seen; any other at zero.
+        Start values of unobserved states of a user's own model, by name; for several measurements also a list
+        of such tables. The search for these states begins with the motion from there, driven by the observed
+        columns. Default: the rate, or the integral, of an observed state; the typical size of the
+        observations if the law is undefined or flat below zero; else zero.
 
     Returns
     -------
     Fit
-        Its ``summary()`` says first whether something is missing: how large an error of the model the record
-        needed beside what a right one needs, whether the innovations are white, what ran off. Where
-        something is, the standard errors contain that. If another unit explains the record far better, a
-        warning says so, and the fit is that of the numbers as stated.
+        Call ``summary()`` first: it says whether the model lacks something, from the model error that the
+        record needed, the whiteness of the innovations and runaway parameters. If it does, the standard
+        errors contain that. A warning says if another unit explains the record far better; the fit keeps the
+        given units. `parameters`, `errors`, `chi2`, `states`, `residuals` and `covariance` hold the numbers;
+        ``udd.plot.residuals(result)`` and ``udd.plot.misfit(result)`` show them.
 
     Raises
     ------
     FitError
         The measurement does not suit the model, is too short, or does not determine the parameters; or its
         numbers cannot be in s, m and rad.
+
+    See Also
+    --------
+    discover : find what a fitted model lacks.
+    forecast : predict the motion after the record.
+    Fit.budget : uncertainty budget of the parameters.
+    input_bias : bias by noisy inputs.
+
+    References
+    ----------
+    Weak-constraint 4D-Var: Y. Trémolet, Q. J. R. Meteorol. Soc. 132 (2006) 2483. Multiple shooting: H. G.
+    Bock, in "Modelling of Chemical Reaction Systems" (1981) 102.
 
     Examples
     --------
@@ -121,10 +139,10 @@ def fit(
     measurement = continuous(measurement, model)
     record = record_of(measurement, model, state0)
     options = options_of(free, camera, priors, each)
-    (found,) = checked_units(
+    (result,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
-    return found.without_cache().doubted()
+    return result.without_cache().doubted()
 
 
 def options_of(
@@ -133,7 +151,7 @@ def options_of(
     priors: Mapping[str, tuple[float, float]] | None,
     each: Iterable[str] | None,
 ) -> dict[str, Any]:
-    """What a user may say of a fit's parameters, to be read more than once."""
+    """Collect a user's options about parameters so that they can be read more than once."""
     lists = {
         "free": None if free is None else names_of("free", free),
         "camera": camera if isinstance(camera, bool) else names_of("camera", camera),
@@ -155,16 +173,16 @@ def fit_record(
     each: Iterable[str] | None = None,
     search: bool = False,
 ) -> Fit:
-    """As :func:`fit`, of some of the measurement's frames.
+    """Fit some of the measurement's frames, as :func:`fit` does for all.
 
-    For a search the model is held as tightly as it can be, within what a film allows.
+    A search uses the smallest model error that the profile allows to a search.
     """
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
     kind, profile = models[0].kind, models[0].profile
     zero = profile.sensor.zero
-    if camera is True and zero is not None and all(is_encoder(own) for own in measurements):
-        camera = (zero,)  # and no perspective
+    if camera is True and zero is not None and all(is_encoder(film) for film in measurements):
+        camera = (zero,)  # an encoder has no perspective
     parameters = free_parameters(models, free, camera, priors, each)
     if isinstance(models[0], FormulaModel):
         schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
@@ -172,66 +190,67 @@ def fit_record(
         schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
     point = _start(models, measurements, record)
-    if search and models[0].inputs:  # a fit finds out by itself how tightly the model is held
+    if search and models[0].inputs:  # a fit finds the model error itself
         problem = _with_input_noise(measurements, problem, point)
     return _anneal(measurements, problem, point)
 
 
 def _with_input_noise(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Problem:
-    """The problem with the noise of inputs as a part of the model's error.
+    """Add the noise of the inputs to the model error.
 
-    Not where the inputs have none: then the model's likeliest error is far below what it would make.
+    Return the problem unchanged if the inputs have no noise: the most probable model error is then far below
+    what that noise would cause.
     """
-    # Without this a driven machine that lacks nothing gets a formula, and one with dry friction a wave.
+    # Without this a complete driven machine gets a spurious formula, and one with dry friction a wave.
     noise = diffusion_by_noise(problem.models, problem.record)
     moved = noise > 0.0
     if not moved.any():
         return problem
     try:
-        found = _anneal(measurements, replace(problem, likeliest=True), point)
-        if (np.array(found.problem.diffusion)[moved] < noise[moved] / LEVELS_APART).any():
+        fitted = _anneal(measurements, replace(problem, likeliest=True), point)
+        if (np.array(fitted.problem.diffusion)[moved] < noise[moved] / LEVEL_RATIO).any():
             return problem
     except SolveError:
-        pass  # which says nothing of the noise
+        pass  # a failed fit says nothing about the noise
     schedule = tuple(tuple(np.hypot(level, noise).tolist()) for level in problem.schedule)
     return replace(problem, schedule=schedule, diffusion=schedule[0])
 
 
 def astray(fitted: Fit) -> bool:
-    """Whether a fit explains so little, or is so far from what was stated, that a unit may be wrong.
+    """Return True if a fit is so bad, or so far from the given values, that a unit may be wrong.
 
-    An effect that is missing does as much: :func:`udd.fitting.units.other_unit` tells the two apart.
+    A missing effect can do the same: :func:`udd.fitting.units.other_unit` distinguishes the two.
     """
     pairs = zip(fitted.models, fitted.problem.models, strict=True)
-    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or any(_pace_is_off(*pair) for pair in pairs)
+    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or any(_is_frequency_off(*pair) for pair in pairs)
 
 
 def ran_away(fitted: Fit) -> bool:
-    """Whether the drive or the camera of a fit came out where no drive and no camera is.
+    """Return True if the fitted drive or camera has impossible values.
 
-    A strong effect that is missing does that: the fit then makes up for it with a clock that is off by a
-    third, or with a drive a fifth of the stated.
+    A strong missing effect causes that: the fit then compensates with a clock that is off by a third, or with
+    a drive a fifth of the given one.
     """
     stated = fitted.model.profile.fit.stated
     parts = [f for f in fitted.problem.free if f.role != "model" or f.name.partition("[")[0] in stated]
-    return any(abs(fitted.point.value(f) - f.mean) > _FAR * f.sd for f in parts)
+    return any(abs(fitted.point.value(f) - f.mean) > _RUNAWAY_SD * f.sd for f in parts)
 
 
-def _pace_is_off(found: Model, known: Model) -> bool:
-    """Whether the motion has another pace than stated by far, as a pendulum's swings may."""
-    pace = known.profile.fit.pace
+def _is_frequency_off(fitted: Model, given: Model) -> bool:
+    """Return True if the measured frequency is far from the model's, as a pendulum's may be."""
+    pace = given.profile.fit.pace
     if pace is None:
         return False
-    ratio = pace(found.parameters) / pace(known.parameters)
-    return not 1 / _PACE < ratio < _PACE
+    ratio = pace(fitted.parameters) / pace(given.parameters)
+    return not 1 / _MAX_FREQUENCY_RATIO < ratio < _MAX_FREQUENCY_RATIO
 
 
-def _drive_is_off(measurement: Measurement, model: Model) -> bool:
-    """Whether the frames alone show another drive than stated by far."""
+def _is_drive_off(measurement: Measurement, model: Model) -> bool:
+    """Return True if the frames alone show a drive far from the given one."""
     fit, name = model.profile.fit, model.profile.dynamics.drive
     if fit.drive_seen is None or name is None or measurement.kind != model.kind or not model.parameters[name]:
         return False
-    return not 1 / _OFF < drive_seen(measurement) / model.parameters[name] < _OFF
+    return not 1 / _MAX_DRIVE_RATIO < drive_seen(measurement) / model.parameters[name] < _MAX_DRIVE_RATIO
 
 
 def checked_units(
@@ -240,7 +259,7 @@ def checked_units(
     options: Mapping[str, Any],
     fits: Callable[[], tuple[Fit, ...]],
 ) -> tuple[Fit, ...]:
-    """Fits of a measurement, with a word on whether its numbers may be in another unit than stated.
+    """Run fits and check whether the measurement's numbers may be in another unit than assumed.
 
     Parameters
     ----------
@@ -254,42 +273,42 @@ def checked_units(
     Returns
     -------
     tuple of Fit
-        Of which :attr:`Fit.unit_doubt` says if another unit explains the measurement far better. A warning
-        says so too.
+        With :attr:`Fit.unit_doubt` set if another unit explains the measurement far better; a warning says so
+        too.
 
     Raises
     ------
     FitError
-        Numbers that cannot be in s, m and rad; or what `fits` raises.
+        The numbers cannot be in s, m and rad; or `fits` raises it.
     """
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = _models(model, measurements)
     free = options["free"]
-    free_parameters(models, **options)  # which says what is wrong with them
+    free_parameters(models, **options)  # raises if an option is wrong
     ask(measurements, models)
     unknown = models[0].profile.fit.unknown
-    left = [name for name in unknown if free is None or name in free]
+    unknown_free = [name for name in unknown if free is None or name in free]
     asked: list[str | None] = []
 
     def check(ends: Sequence[Sequence[Model]] = ()) -> None:
         if asked or not unknown:
             return
-        asked.append(other_unit(measurements, models, ends, partial(_loosest, left)))
+        asked.append(other_unit(measurements, models, ends, partial(_loosest, unknown_free)))
         if asked[0]:
-            warnings.warn(f"{asked[0]}; the fit goes on as stated", stacklevel=outside())
+            warnings.warn(f"{asked[0]}; the fit continues with the given units", stacklevel=outside())
 
-    if any(_drive_is_off(*pair) for pair in zip(measurements, models, strict=True)):
+    if any(_is_drive_off(*pair) for pair in zip(measurements, models, strict=True)):
         check()
     try:
-        found = fits()
+        fitted = fits()
     except SolveError as error:
         check()
-        if asked and asked[0]:  # which is why, most probably
+        if asked and asked[0]:  # most probably the reason
             raise FitError(f"{error}; {asked[0]}") from error
         raise
-    if any(astray(one) for one in found):
-        check([one.models for one in found])
-    return tuple(replace(one, unit_doubt=asked[0]) for one in found) if asked and asked[0] else found
+    if any(astray(each) for each in fitted):
+        check([each.models for each in fitted])
+    return tuple(replace(each, unit_doubt=asked[0]) for each in fitted) if asked and asked[0] else fitted
 
 
 def _loosest(
@@ -301,7 +320,7 @@ def _loosest(
     scale: Scale,
     fixed: frozenset[str],
 ) -> Fit:
-    """The fit of a model with a large model error, its drive and the camera as stated."""
+    """Fit a model with a large model error, the drive and the camera fixed at their given values."""
     profile = models[0].profile
     some = [name for name in free if name not in fixed]
     parameters = free_parameters(models, some, profile.sensor.pivot, each=())
@@ -316,70 +335,74 @@ def _loosest(
 
 
 def _start(models: Sequence[Model], measurements: Sequence[Measurement], record: Record) -> Point:
-    """The states as they were read, all parameters as they are known."""
+    """Return the start of a fit: the states as read, all parameters at their given values."""
     sets = tuple(
-        FilmParameters(list(own.parameters.values()), known_camera(own.kind, film.meta), 0.0)
-        for own, film in zip(models, measurements, strict=True)
+        FilmParameters(list(model.parameters.values()), known_camera(model.kind, film.meta), 0.0)
+        for model, film in zip(models, measurements, strict=True)
     )
     return Point(record.states, sets)
 
 
 def _models(model: Model | Sequence[Model], measurements: Sequence[Measurement]) -> tuple[Model, ...]:
-    """One model per measurement, alike but for their numbers."""
+    """Return one model per measurement; they may differ only in parameter values."""
     models = tuple(model) if isinstance(model, Sequence) else (model,) * len(measurements)
     if len(models) != len(measurements):
-        raise FitError(f"there are {len(measurements)} measurements but {len(models)} models")
-    for own, measurement in zip(models, measurements, strict=True):
-        if not isinstance(own, Model):
-            raise FitError(f"a model is needed (udd.Disk, udd.Pendulum, udd.Model), not {own!r}")
-        if not own.profile.written and measurement.kind != own.kind:
+        raise FitError(
+            f"got {len(measurements)} measurements but {len(models)} models; expected one, or one each"
+        )
+    for each, measurement in zip(models, measurements, strict=True):
+        if not isinstance(each, Model):
+            raise FitError(f"a model is needed (udd.Disk, udd.Pendulum, udd.Model), not {each!r}")
+        if not each.profile.written and measurement.kind != each.kind:
             raise FitError(
                 f"the measurement has columns {', '.join(measurement.names)}, "
-                f"which {type(own).__name__} does not explain"
+                f"which {type(each).__name__} does not explain"
             )
-        if list(own.parameters) != list(models[0].parameters):
+        if list(each.parameters) != list(models[0].parameters):
             raise FitError(
                 "the models of several measurements must be alike but for their parameters' values"
             )
-    written = [own for own in models if isinstance(own, FormulaModel)]
+    written = [each for each in models if isinstance(each, FormulaModel)]
     return driven(written, measurements) if written and written[0].inputs else models
 
 
 def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) -> tuple[Problem, Point]:
-    """The problem of a fit with more effects, held as they are, and where that fit ended.
+    """Add effects, with fixed parameters, to the problem of a fit; return it with the fit's end point.
 
-    Or where another fit of the same data ended.
+    `start` may be another fit of the same data whose end point is used instead.
     """
-    models = tuple(own.with_effects((*own.effects, *effects)) for own in fitted.models)
-    known = len(fitted.model.parameters)
+    models = tuple(model.with_effects((*model.effects, *effects)) for model in fitted.models)
+    known_count = len(fitted.model.parameters)
     more = [value for effect in effects for value in effect.values]
     end = (start or fitted).point
     sets = tuple(
-        FilmParameters([*values[:known], *more], camera, clock) for values, camera, clock in end.sets
+        FilmParameters([*values[:known_count], *more], camera, clock) for values, camera, clock in end.sets
     )
     return replace(fitted.problem, models=models), Point(end.states, sets)
 
 
 def started_at(fitted: Fit, last: Fit, seen: NDArray[np.bool_] | None = None) -> Fit:
-    """A fit to be gone on from where another one ended, of more effects perhaps, with as much free as there.
+    """Return a fit that continues from the end of another one, which may have more effects.
 
-    `seen` is the part of the data that it was of, if not of all. The states of the rest start as they were
-    read.
+    The same parameters are free as in `last`. `seen` masks the frames that `last` was fitted to; None for
+    all. The other frames start at the states as read.
     """
-    known = len(fitted.model.parameters)
-    free = tuple(f for f in last.problem.free if f.role != "model" or f.index < known)
-    sets = tuple(FilmParameters(values[:known], camera, clock) for values, camera, clock in last.point.sets)
+    known_count = len(fitted.model.parameters)
+    free = tuple(f for f in last.problem.free if f.role != "model" or f.index < known_count)
+    sets = tuple(
+        FilmParameters(values[:known_count], camera, clock) for values, camera, clock in last.point.sets
+    )
     states = fitted.record.states.copy()
     states[slice(None) if seen is None else seen] = last.states
     return replace(fitted, problem=_with_free(fitted, free), point=Point(states, sets))
 
 
 def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], goal: Goal = ANY) -> Fit:
-    """Fit again with more effects, all coefficients free, from where a fit ended.
+    """Fit again with more effects, all coefficients free, starting at the end of a fit.
 
-    The noise stays as it was estimated, so that the two fits' chi2 compare. A frequency is free within its
-    line; a shape that may have any value is, once the rest has been found, within a factor of some two, or
-    a place by about the width that belongs to it.
+    The noise stays fixed, so that the chi2 of both fits can be compared. A frequency is free within its
+    spectral line. Shapes that may have any value are freed after the rest has converged: within a factor of
+    about two, or for a place within about its width.
 
     Parameters
     ----------
@@ -387,7 +410,7 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
     effects : sequence of Effect
         The effects to add.
     amplitudes : sequence of float
-        Where their amplitudes start, in order.
+        Start values of their amplitudes, in order.
     goal : Goal
         What the fit must reach to be of use.
     """
@@ -398,35 +421,35 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
     names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
     line = 0.5 / float(np.ptp(fitted.record.t))
     more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
-    own = [(e, p) for e in effects for p in e.spec.parameters if p.sought]
-    waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in own if p.role == "frequency"]
+    optimised = [(e, p) for e in effects for p in e.spec.parameters if p.sought]
+    waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in optimised if p.role == "frequency"]
     shapes = [
         (f"{e.name}.{p.name}", e.parameters[p.name], _spread(e, p))
-        for e, p in own
+        for e, p in optimised
         if p.role in ("shape", "scanned")
     ]
     more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
     problem = replace(problem, free=problem.free + more)
-    first = replace(goal, chi2=np.inf) if shapes else goal  # which is lower once the shapes are free
-    found = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:], goal=first)
+    first = replace(goal, chi2=np.inf) if shapes else goal  # chi2 falls once the shapes are free
+    first_fit = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:], goal=first)
     if not shapes:
-        return found
+        return first_fit
     more = tuple(Free(name, "model", order.index(name), value, sd) for name, value, sd in shapes)
     problem = replace(problem, free=problem.free + more)
-    if found.level > 1:
+    if first_fit.level > 1:
         try:
-            tight = problem.schedule[found.level :]
-            shaped = reduce_model_error(fitted.measurements, problem, found.point, tight, goal=goal)
+            tight = problem.schedule[first_fit.level :]
+            shaped = reduce_model_error(fitted.measurements, problem, first_fit.point, tight, goal=goal)
             if shaped.converged:
                 return shaped
         except FitError:
             pass
-    # Far from its shape a model that is held that tightly does not find the way.
-    return reduce_model_error(fitted.measurements, problem, found.point, problem.schedule[1:], goal=goal)
+    # Far from its shape, a fit with such a small model error does not converge.
+    return reduce_model_error(fitted.measurements, problem, first_fit.point, problem.schedule[1:], goal=goal)
 
 
 def _spread(effect: Effect, parameter: Parameter) -> float:
-    """The standard deviation of the prior of a shape, or of a place: as far as the next that a scan tries."""
+    """Return a shape's (or place's) prior standard deviation: the distance to the next value of a scan."""
     widths = [effect.parameters[p.name] for p in effect.spec.parameters if p.role == "shape"]
     if parameter.role == "scanned" and widths:
         return widths[0]
@@ -434,7 +457,7 @@ def _spread(effect: Effect, parameter: Parameter) -> float:
 
 
 def as_stated(fitted: Fit) -> Fit:
-    """Fit anew with the drive and the camera, but for the pivot, held as they were stated; for a search."""
+    """Fit again with the drive and the camera (except the pivot) at their given values; for a search."""
     profile = fitted.model.profile
 
     def kept(free: Free) -> bool:
@@ -443,39 +466,40 @@ def as_stated(fitted: Fit) -> Fit:
             return name not in profile.fit.stated
         return free.role == "camera" and name in profile.sensor.pivot
 
-    free = tuple(one for one in fitted.problem.free if kept(one))
+    free = tuple(parameter for parameter in fitted.problem.free if kept(parameter))
     problem = replace(fitted.problem, free=free, noise=stated(fitted.record))
     start = _start(problem.models, fitted.measurements, fitted.record)
     return _anneal(fitted.measurements, problem, start)
 
 
 def released(fitted: Fit, free: Sequence[Free]) -> Fit:
-    """The same with more parameters free, those of effects that were added to the model beside them.
+    """Fit again with more free parameters, alongside those of the added effects.
 
-    From the largest model error on: held tightly, chaos has a minimum near every value that they had.
+    The schedule starts at the largest model error: with a small one, chaos has a minimum near every start
+    value.
     """
-    # Without this a load-dependent drive is followed by a slip that is not there.
+    # Without this, a spurious slip follows a load-dependent drive.
     problem = _with_free(fitted, free)
     return reduce_model_error(fitted.measurements, problem, fitted.point, problem.schedule)
 
 
 def released_anew(fitted: Fit, free: Sequence[Free]) -> Fit:
-    """As :func:`released`, with the noise estimated anew: around a model that went astray it hardly shows."""
+    """Fit as :func:`released` does, and estimate the noise again: a diverged model hardly shows it."""
     problem = replace(_with_free(fitted, free), noise=stated(fitted.record))
     return _anneal(fitted.measurements, problem, fitted.point)
 
 
 def _with_free(fitted: Fit, free: Sequence[Free]) -> Problem:
-    known = {f.name for f in free}
-    added = tuple(f for f in fitted.problem.free if f.name not in known)
+    names = {f.name for f in free}
+    added = tuple(f for f in fitted.problem.free if f.name not in names)
     return replace(fitted.problem, free=(*free, *added))
 
 
 def refit(fitted: Fit, *, trusted: bool = False) -> Fit:
-    """The same model fitted again, the noise estimated anew, and held as tightly as is likeliest.
+    """Fit the same model again with new noise, at the most probable model error.
 
-    In a search the noise stays as the first model showed it, so that chi2 compares. The noise of a film whose
-    geometry is not `trusted` stays as it was assumed.
+    In a search the noise stays that of the first model, so that chi2 can be compared. The noise of a film
+    stays at its assumed value unless the geometry is `trusted`.
     """
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
@@ -487,75 +511,76 @@ def refit(fitted: Fit, *, trusted: bool = False) -> Fit:
         if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
         result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
-    except SolveError:  # as where a threshold ends at zero, and beyond
+    except SolveError:  # for example, a threshold that ends at or below zero
         return fitted
     return result if result.converged else fitted
 
 
 def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Fit:
-    """Solve from loose to tight.
+    """Solve the problem while the model error is reduced step by step.
 
-    The noise is estimated at the loosest level at which the misfits still show it, where a wrong model does
-    the least harm, and again at the last one if the model gets there. At looser ones the states follow every
-    frame, and noise and model error cannot be told apart.
+    The noise is estimated at the largest model error at which the misfits show it, because a wrong model does
+    least harm there. It is estimated again at the last level, if the model reaches it. At still larger model
+    errors the states follow every frame, and noise and model error cannot be distinguished.
     """
     as_stated, first = problem.noise, point
     for number, diffusion in enumerate(problem.schedule):
         problem = replace(problem, diffusion=diffusion, noise=as_stated)
         misfits, problem, point = _estimate_noise(measurements, problem, point)
         if misfits == "faults":
-            break  # held more tightly, they show even more of them
+            break  # a smaller model error shows even more of them
         if misfits == "noise":
             loose = provisional_fit(measurements, problem, point)
-            # Of a pendulum's film a search does not believe what the noise is to better than its geometry.
+            # A search does not trust a pendulum film's noise to be below its geometric error.
             if problem.likeliest or not profile_of(measurements[0].kind).sensor.faithful:
                 loose = _likeliest_noise(loose, problem.schedule[number + 1 :])
             tighter = problem.schedule[loose.level + 1 :]
             if not tighter:
                 return loose
             return reduce_model_error(measurements, loose.problem, _afresh(loose), tighter, loose)
-    # A film so precise that its noise never shows, or shows less than the model's faults, is believed.
+    # If the noise never shows, or is below the model's faults, the film is very precise: use its stated
+    # noise.
     believed = as_stated.everywhere(len(problem.record.t))
     return reduce_model_error(measurements, replace(problem, noise=believed), first, problem.schedule)
 
 
 def _likeliest_noise(fitted: Fit, tighter: Sequence[tuple[float, ...]]) -> Fit:
-    """The fit of the last level with the noise estimated there, if that is likelier all the way.
+    """Return the fit of the last level with the noise estimated there, if the evidence rises on the way.
 
-    Where the states still follow the frames the noise comes out too small, and a right model would then be
-    found wanting. A right model takes several levels at once; of one that does not get to the last the noise
-    stays as it was found.
+    While the states still follow the frames, the noise estimate is too small, and a correct model would then
+    seem incomplete. A correct model can skip levels. If a model does not reach the last level, its noise
+    stays.
     """
-    # Without this a plain disk seen to 0.1 mm and 1 mrad is said to lack something.
-    found, left = fitted, list(tighter)
+    # Without this, a plain disk measured to 0.1 mm and 1 mrad is reported as incomplete.
+    best, left = fitted, list(tighter)
     while left:
         ahead = min(LEAP, len(left))
-        further = (_likelier(found, left[k - 1]) for k in dict.fromkeys((ahead, 1)))
-        one = next(filter(None, further), None)
-        if one is None:
+        further = (_likelier(best, left[k - 1]) for k in dict.fromkeys((ahead, 1)))
+        next_fit = next(filter(None, further), None)
+        if next_fit is None:
             return fitted
-        found, left = one, left[left.index(one.problem.diffusion) + 1 :]
-    return found
+        best, left = next_fit, left[left.index(next_fit.problem.diffusion) + 1 :]
+    return best
 
 
 def _likelier(fitted: Fit, diffusion: tuple[float, ...]) -> Fit | None:
-    """The fit held as tightly, with the noise estimated there, if that makes the record likelier."""
+    """Fit with this model error, the noise estimated there; None if the evidence does not rise."""
     problem = fitted.problem.with_model_error(diffusion)
     try:
         misfits, problem, point = _estimate_noise(fitted.measurements, problem, _afresh(fitted), FEW)
         if misfits != "noise":
             return None
-        found = provisional_fit(fitted.measurements, problem, point, FEW)
+        result = provisional_fit(fitted.measurements, problem, point, FEW)
     except FitError:
         return None
-    return found if found.converged and found.evidence > fitted.evidence else None
+    return result if result.converged and result.evidence > fitted.evidence else None
 
 
 def _afresh(fitted: Fit) -> Point:
-    """The states of a fit, with those of the model's parameters that have a prior at its mean.
+    """Return the states of a fit; model parameters with a prior go back to its mean.
 
-    Where states follow the frames a law that bends with the speed, as the friction's does, may come out
-    flat, and would then stay so.
+    While the states follow the frames, a law that is nonlinear in the speed, such as friction, may come out
+    flat, and would then stay flat.
     """
     sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fitted.point.sets]
     for free in fitted.problem.free:
@@ -566,18 +591,18 @@ def _afresh(fitted: Fit) -> Point:
 
 
 def _is_known(measurement: Measurement) -> bool:
-    """Whether the noise is known beforehand: stated, or as the frames of a sensor show it."""
+    """Return True if the noise is known beforehand: stated, or shown by the frames of a sensor."""
     return measurement.sigma is not None or profile_of(measurement.kind).written or is_encoder(measurement)
 
 
 def _least(measurements: Sequence[Measurement], search: bool) -> float:
-    """What the noise is at least, in units of what is known beforehand."""
+    """Return the lower limit of the noise, in units of the noise that is known beforehand."""
     result = 0.0 if profile_of(measurements[0].kind).written else _FINEST
-    for own in measurements:
-        least = profile_of(own.kind).sensor.faithful
-        if least and is_encoder(own):
+    for measurement in measurements:
+        least = profile_of(measurement.kind).sensor.faithful
+        if least and is_encoder(measurement):
             return 1.0
-        if search and own.sigma is None:
+        if search and measurement.sigma is None:
             result = max(result, least)
     return result
 
@@ -585,11 +610,11 @@ def _least(measurements: Sequence[Measurement], search: bool) -> float:
 def _estimate_noise(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point, steps: int = MOST
 ) -> tuple[Misfits, Problem, Point]:
-    """Fit and estimate the noise in turns; what the misfits show, and what was found.
+    """Alternate between fitting and estimating the noise; return the source of the misfits and the result.
 
-    A model that does not get there in so many `steps` is wrong.
+    A model that does not converge in so many `steps` is wrong.
     """
-    known = all(_is_known(own) for own in measurements)
+    is_known = all(_is_known(measurement) for measurement in measurements)
     least = _least(measurements, search=not problem.likeliest)
     for _ in range(_NOISE_ROUNDS):
         result = solve(measurements, problem, point, steps, decrease=ROUGH)
@@ -599,7 +624,7 @@ def _estimate_noise(
         if result.leverage > FOLLOWS:
             return "little", problem, point
         noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
-        if known and noise.beyond(problem.record, result.blurring, _BELIEVED):
+        if is_known and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return "faults", problem, point
         noise = replace(noise, factor=np.maximum(noise.factor, least))
         problem = replace(problem, noise=noise)

@@ -44,49 +44,54 @@ __all__ = ["Forecast", "forecast"]
 
 Array = NDArray[np.float64]
 
-# Times in s; of a user's own model in units of its `pace`.
-_STEP = 0.01  # between the times that a forecast is given at
-_KICK = 0.1  # between the kicks that stand for the model's assumed error
-_FEWEST = 6  # frames that determine a state
-_TRIES = 100  # draws of a member's parameters that no model has
+# Times in s; for a user's own model in units of `motion_time_scale`.
+_STEP = 0.01  # between the times of a forecast
+_KICK = 0.1  # between the random kicks that represent the assumed model error
+_FEWEST = 6  # frames needed to determine a state
+_TRIES = 100  # draws of a member's parameters that are invalid for the model
 _RTOL, _ATOL = 1e-9, 1e-12
-_GROWTH_TIME = 4000.0  # over which the exponent is averaged; its error is then a percent or two
+_GROWTH_TIME = 4000.0  # over which the exponent is averaged, to an error of one or two percent
 
 
 @dataclass(frozen=True, eq=False)
 class Forecast(Drawable):
-    """What is expected to be seen, with the fan of an ensemble.
+    """Forecast of the observed columns, with the spread of an ensemble.
 
     Attributes
     ----------
     t : ndarray (k,)
-        Times on the measurement's clock, s; the first is where the model was let go.
+        Times on the measurement's clock, s; the first is the start of the forecast.
     median, low, high : ndarray (k, m)
-        Of the members, for every channel of the measurement and in its units; `low` and `high` enclose the
-        share `level` of them. NaN where more than half of the disks have left the wheels.
+        Quantiles of the members, for every channel of the measurement and in its units; `low` and `high`
+        enclose the share `level` of them. NaN if more than half of the disks have lost contact with the
+        wheels.
     members : ndarray (n, k, m)
-        The ensemble; NaN after a disk has left the wheels.
+        The ensemble; NaN after a disk has lost contact with the wheels.
     names : tuple of str
         The channels.
     level : float
         Share of the members between `low` and `high`.
     error : float
-        What counts as parted, m of the disk's centre or rad of a pendulum; of a user's own model the root
+        Threshold for divergence, m of the disk's centre or rad of a pendulum; for a user's own model the root
         mean square over the columns, in units of the motion's spread.
     valid_time : float
-        Time after the start until half of the members have parted from the median by `error`, s; inf where
-        that lies beyond the forecast.
+        Time after the start until half of the members have diverged from the median by `error`, s; inf if the
+        forecast ends before.
     valid_low, valid_high : float
-        The times until that share of the members have parted which `level` leaves below and above.
+        The times until the shares ``(1 - level)/2`` and ``(1 + level)/2`` of the members have diverged, s.
     lyapunov_time : float
-        Time in which errors grow e-fold in the long run, 1/lambda_1 of the fitted equations (with no edge of
-        the disk), s; inf where they do not grow, NaN where there is no exponent.
+        Time in which errors grow e-fold on average, 1/lambda_1 of the fitted equations (without the disk's
+        edge), s; inf if errors do not grow, NaN if there is no exponent.
     measured_valid_time : float
-        Time until the measurement itself parts from the median by `error`; NaN where it ends before.
+        Time until the measurement itself diverges from the median by `error`; NaN if it ends before.
     fit : Fit
-        What was forecast with.
+        The fit behind the forecast.
     measurement : Measurement
-        What the state was filtered from, and what there is of it afterwards.
+            The measurement: the state was filtered from it, and its later frames are compared.
+
+    See Also
+    --------
+    udd.plot.forecast : draw the fan with the measurement.
     """
 
     t: Array
@@ -107,16 +112,16 @@ class Forecast(Drawable):
 
     @property
     def start(self) -> float:
-        """Time from which the model runs free, s."""
+        """Start time of the forecast, s."""
         return float(self.t[0])
 
     @property
     def lyapunov_times(self) -> float:
-        """The valid time in Lyapunov times; NaN where there are none."""
+        """The valid time in Lyapunov times; NaN if there are none."""
         return self.valid_time / self.lyapunov_time if math.isfinite(self.lyapunov_time) else math.nan
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the forecast as JSON-ready values."""
         curves = {key: getattr(self, key) for key in ("median", "low", "high")}
         return {
             "start_s": self.start,
@@ -158,63 +163,70 @@ def forecast(
     process: bool = True,
     rng: Rng = 0,
 ) -> Forecast:
-    """Forecast the motion from the last second of a measurement, with the fan of an ensemble.
+    """Forecast the motion from the last second of a measurement, with an ensemble.
 
-    Every member draws the model's and the camera's parameters from the fit's covariance, filters its own
-    state from the window with them, draws from that state's covariance, and runs free, kicked by the model's
-    error that the fit assumed.
+    Every member draws the model's and the camera's parameters from the fit's covariance and filters its own
+    state from the window with them. It then draws a start from that state's covariance and runs freely, with
+    random kicks of the size of the fit's model error.
 
     Parameters
     ----------
     measurement : Measurement
-        Its frames in the window before `start` are used; later ones are only compared.
+        Its frames in the window before `start` are used; later frames are only compared.
     model : Disk, Pendulum, a user's own Model, or Fit
-        A model is fitted first, to all frames up to `start` (:func:`udd.fit`); a fit is taken as it is.
+        A model is fitted first, to all frames up to `start` (:func:`udd.fit`); a fit is used as it is.
     t : float or array_like, shape (k,), optional
-        How far to look ahead, s after the start; or the times after it that are wanted, increasing. By
-        default 10 s for a disk, 60 s for a pendulum; of a user's own model ten times the time in which its
-        motion changes, four times over.
+        Forecast length, s after the start; or the forecast times after it, increasing. Default: 10 s for a
+        disk, 60 s for a pendulum, and for a user's own model ten units, each about four correlation times of
+        its motion.
     start : float, optional
-        Time on the measurement's clock from which the model runs free, s: its last frame up to then starts.
-        By default the last frame of all.
+        Time on the measurement's clock at which the forecast starts, s; the last frame up to then is used.
+        Default: the last frame of all.
     window : float, optional
-        Time before the start from which the state is filtered, s; by default 1 s, or 4 s for a pendulum; of a
+        Time before the start from which the state is filtered, s. Default: 1 s, or 4 s for a pendulum; for a
         user's own model a tenth of the default for `t`.
     members : int
         Size of the ensemble.
     level : float
         Share of the members between `low` and `high`.
     error : float, optional
-        The error until which the forecast counts as valid: by default 5 mm of the disk's centre, 0.05 rad of
-        a pendulum, 0.2 of the spread of a user's own motion.
+        The error up to which the forecast counts as valid. Default: 5 mm of the disk's centre, 0.05 rad of a
+        pendulum, 0.2 of the spread of a user's own motion.
     film : int, optional
-        For a fit of several measurements: which of them has the camera and the drive of this one. By default
-        the one that it is.
+        For a fit of several measurements: number of the one with the camera and the drive of this one.
+        Default: the one that is identical.
     process : bool
-        Whether the members are kicked. Without, the model's equations are taken as exact.
+        Whether random kicks act on the members. False treats the model's equations as exact.
     rng : int, Generator or None
-        Of the ensemble. The same whole number gives the same one; None takes fresh entropy.
+        Seed of the ensemble. The same whole number gives the same ensemble; None takes fresh entropy.
 
     Returns
     -------
     Forecast
+        `t`, `median`, `low`, `high` and `members` hold the ensemble; `valid_time` and `lyapunov_time` its
+        horizon.
 
     Raises
     ------
     FitError
         The fit fails, or the window holds fewer than six frames without a gap.
     ModelError
-        An option that cannot be used.
+            An option is out of range.
+
+    See Also
+    --------
+    udd.fit : fit the model first.
+    udd.plot.forecast : draw the result.
 
     Notes
     -----
-    The fan is that of the motion as the camera would see it; the noise of single frames comes on top. Where
-    the fit does not explain its data (chi2 per degree of freedom above 1), all spreads are widened by the
-    root of that. The clock's error is fixed at its fitted value.
+    The fan is that of the motion as the camera would see it; the noise of single frames is not included. If
+    the fit does not explain its data (chi2 per degree of freedom above 1), all spreads are multiplied by the
+    square root of that ratio. The clock's error is fixed at its fitted value.
 
     Examples
     --------
-    A pendulum whose last swing is known to a milliradian:
+    A pendulum, forecast to 5 mrad:
 
     >>> import numpy as np, udd
     >>> t = np.arange(0, 30, 0.05)
@@ -228,18 +240,20 @@ def forecast(
     inf
     """
     if not isinstance(measurement, Measurement):
-        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+        raise FitError(
+            f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r:.80}"
+        )
     measurement = continuous(measurement, model.model if isinstance(model, Fit) else model)
-    asked = _options(members, level)
+    checked = _options(members, level)
     random = generator(rng)
     if t is not None:
         _times(t, _STEP)
-    known = measurement
+    past = measurement
     if start is not None:
-        known = measurement.rows(measurement.t <= number("start", start))
+        past = measurement.rows(measurement.t <= number("start", start))
         if start > measurement.t[-1] + np.median(np.diff(measurement.t)):
             raise FitError(
-                f"a forecast cannot start at {start:g} s: the record ends at {measurement.t[-1]:g} s"
+                f"start is {start:g} s, but the record ends at {measurement.t[-1]:g} s; start earlier"
             )
     if window is not None:
         number("window", window, above=0.0)
@@ -252,33 +266,33 @@ def forecast(
                 f"the fit is that of a {fitted.measurement.kind}, the measurement of a {measurement.kind}"
             )
     else:
-        fitted = fit(known, model)
-    # What a user's own model is of its measurement's columns do not tell.
+        fitted = fit(past, model)
+    # The columns of a measurement do not say which unit of time a user's own model needs.
     profile, unit = fitted.model.profile, motion_time_scale(fitted)
     large = profile.fit.valid_error if error is None else float(error)
     times = _times(profile.fit.ahead * unit if t is None else t, _STEP * unit)
     length = float(profile.fit.window * unit if window is None else window)
-    record = record_of(known, fitted.model if profile.written else None)
+    record = record_of(past, fitted.model if profile.written else None)
     film = _film(fitted, measurement, film)
     part, origin = _window(fitted, film, record, length)
 
     scale = max(fitted.scatter, 1.0) ** 0.5
-    own = fitted.models[film]
-    if isinstance(own, FormulaModel) and own.inputs:
-        (own,) = driven((own,), (measurement,), origin)
-    models, cameras, states = _starts(fitted, own, film, part, asked, scale, random)
+    film_model = fitted.models[film]
+    if isinstance(film_model, FormulaModel) and film_model.inputs:
+        (film_model,) = driven((film_model,), (measurement,), origin)
+    models, cameras, states = _starts(fitted, film_model, film, part, checked, scale, random)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
     runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, random)
     shown = [fitted.channels.index(name) for name in measurement.names]
     seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
-    spread = np.nanstd(known.values, axis=0)
+    spread = np.nanstd(past.values, axis=0)
 
-    low, median, high = _quantiles(seen, asked[1])
+    low, median, high = _quantiles(seen, checked[1])
     valid = [_parted(times, _size(member - median, profile.sensor, spread), large) for member in seen]
-    tail = (1.0 - asked[1]) / 2.0
-    # A member that never parts counts as later than all that do.
+    tail = (1.0 - checked[1]) / 2.0
+    # A member that never diverges counts as later than all that do.
     shortest, valid_time, longest = np.quantile(valid, [tail, 0.5, 1.0 - tail], method="higher")
     clock = t_model + origin
     return Forecast(
@@ -288,12 +302,12 @@ def forecast(
         high=high,
         members=seen,
         names=measurement.names,
-        level=asked[1],
+        level=checked[1],
         error=large,
         valid_time=float(valid_time),
         valid_low=float(shortest),
         valid_high=float(longest),
-        lyapunov_time=_growth(own, states, _GROWTH_TIME * unit),
+        lyapunov_time=_growth(film_model, states, _GROWTH_TIME * unit),
         measured_valid_time=_compared(measurement, profile.sensor, (clock, median), spread, large),
         fit=fitted,
         measurement=measurement,
@@ -301,14 +315,14 @@ def forecast(
 
 
 def _times(t: ArrayLike, step: float) -> Array:
-    """Times after the start, s, of which the first is 0."""
+    """Check the times after the start and return them, s; the first is 0."""
     wanted = array("t", t)
     if wanted.ndim == 0:
         end = number("t", float(wanted), above=0.0)
         require_memory("times of a forecast", end / step)
         return np.linspace(0.0, end, max(round(end / step), 1) + 1)
     if wanted.ndim != 1 or not wanted.size or wanted[0] < 0 or not (np.diff(wanted) > 0).all():
-        raise ModelError("t must be a time ahead in s, or a list of such times that increases from 0 on")
+        raise ModelError("t must be a time ahead in s, or a list of such times, increasing from 0")
     return wanted if wanted[0] == 0 else np.concatenate([[0.0], wanted])
 
 
@@ -317,26 +331,26 @@ def _options(members: int, level: float) -> tuple[int, float]:
     if share >= 1:
         raise ModelError(f"level must be below 1, not {share:g}")
     if isinstance(members, bool) or not isinstance(members, (int, np.integer)) or members < 2:
-        raise ModelError(f"members must be a whole number from 2 on, not {members!r}")
+        raise ModelError(f"members must be a whole number, at least 2, not {members!r}")
     require_memory(f"{members} members", int(members), itemsize=10_000)
     return int(members), share
 
 
 def _film(fitted: Fit, measurement: Measurement, film: int | None) -> int:
-    """The number of the measurement whose camera and drive count."""
+    """Return the number of the measurement with the right camera and drive."""
     several = len(fitted.measurements)
     if film is not None:
         if isinstance(film, bool) or not isinstance(film, (int, np.integer)) or not 0 <= film < several:
             raise ModelError(f"film must be a whole number from 0 to {several - 1}, not {film!r}")
         return int(film)
-    own = [k for k, each in enumerate(fitted.measurements) if _same(each, measurement)]
-    if several > 1 and not own:
-        raise FitError(f"the fit is that of {several} measurements: say by film= which of them this one is")
-    return own[0] if own else 0
+    matches = [k for k, each in enumerate(fitted.measurements) if _same(each, measurement)]
+    if several > 1 and not matches:
+        raise FitError(f"the fit is of {several} measurements: pass the number of this one as film=")
+    return matches[0] if matches else 0
 
 
 def _same(a: Measurement, b: Measurement) -> bool:
-    """Return True if two measurements have the same rows, made continuous one by one perhaps."""
+    """Return True if two measurements have the same rows, also after angles were made continuous."""
     return a is b or (
         a.names == b.names
         and np.array_equal(a.t, b.t)
@@ -346,7 +360,7 @@ def _same(a: Measurement, b: Measurement) -> bool:
 
 
 def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Record, float]:
-    """The last frames, from which the state is filtered, on the fit's clock, and that clock's zero."""
+    """Return the last frames, for filtering the state, on the fit's clock, and that clock's zero."""
     t, last = record.t, len(record.t) - 1
     breaks = np.flatnonzero(~record.linked)
     run = int(breaks[-1]) + 1 if breaks.size else 0
@@ -354,36 +368,36 @@ def _window(fitted: Fit, film: int, record: Record, length: float) -> tuple[Reco
     count = int(part.observed.any(axis=1).sum())
     if count < _FEWEST:
         raise FitError(
-            f"the {length:g} s before the start hold {count} frames in a row; "
-            f"a state takes at least {_FEWEST}"
+            f"the {length:g} s before the start hold {count} consecutive frames; a state needs at least "
+            f"{_FEWEST}: use a longer window"
         )
-    # The model's time counts from the first row that was fitted.
+    # The model's time counts from the first fitted row.
     origin = fitted.record.origins[film]
     return replace(part, t=part.t + (record.origin - origin)), origin
 
 
 def _starts(
     fitted: Fit,
-    own: Model,
+    film_model: Model,
     film: int,
     part: Record,
-    asked: tuple[int, float],
+    checked: tuple[int, float],
     scale: float,
     rng: np.random.Generator,
 ) -> tuple[list[Model], list[list[float]], Array]:
-    """Every member's model, camera and state at the window's end."""
+    """Draw every member's model, camera and state at the window's end."""
     seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
     (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []
     free = [f for f in fitted.problem.free if f.film in (None, film)]
     draws = _draws(fitted, scale, rng)
-    for _ in range(asked[0]):
-        model, draw = _drawn(own, [f for f in free if f.role == "model"], draws)
+    for _ in range(checked[0]):
+        model, draw = _drawn(film_model, [f for f in free if f.role == "model"], draws)
         camera = list(camera_of_fit)
-        for one in free:
-            if one.role == "camera":
-                camera[one.index] = draw[one.name]
+        for parameter in free:
+            if parameter.role == "camera":
+                camera[parameter.index] = draw[parameter.name]
         try:
             films = [FilmParameters(list(model.parameters.values()), camera, clock)]
             fixed = EstimatorInput(model, seen, part.states, films, (), diffusion)
@@ -397,23 +411,25 @@ def _starts(
 
 
 def _drawn(
-    own: Model, free: Sequence[Free], draws: Iterator[Mapping[str, float]]
+    film_model: Model, free: Sequence[Free], draws: Iterator[Mapping[str, float]]
 ) -> tuple[Model, Mapping[str, float]]:
-    """A model from the next draw; numbers that no such model has are drawn again."""
-    order = list(own.parameters)
+    """Return a model from the next draw that is valid for it."""
+    order = list(film_model.parameters)
     for draw in itertools.islice(draws, _TRIES):
         try:
-            return own.with_parameters({order[one.index]: draw[one.name] for one in free}), draw
+            return film_model.with_parameters(
+                {order[parameter.index]: draw[parameter.name] for parameter in free}
+            ), draw
         except ModelError:
             continue
-    raise FitError("the fit leaves its parameters so uncertain that a draw of them makes no model")
+    raise FitError("the fit leaves its parameters so uncertain that their draws are invalid for the model")
 
 
 def _draws(fitted: Fit, scale: float, rng: np.random.Generator) -> Iterator[Mapping[str, float]]:
-    """Parameters from the fit's covariance; the clock's error is fixed."""
+    """Draw parameters from the fit's covariance; the clock's error is fixed."""
     names = list(fitted.parameters)
     mean = np.array([fitted.parameters[name] for name in names])
-    covariance = fitted.covariance / fitted.widened**2  # what the model may miss kicks it on the way
+    covariance = fitted.covariance / fitted.widened**2  # the kicks represent the model error
     fixed = [k for k, free in enumerate(fitted.problem.free) if free.role == "clock"]
     for k in fixed:
         column = covariance[:, k]
@@ -424,7 +440,7 @@ def _draws(fitted: Fit, scale: float, rng: np.random.Generator) -> Iterator[Mapp
 
 
 def _normal(covariance: Array, rng: np.random.Generator) -> Array:
-    """A draw with this covariance, whatever the units of its rows."""
+    """Draw from a normal distribution with this covariance; its rows may have different units."""
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     unit = np.where(sd > 0, sd, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
@@ -435,7 +451,7 @@ def _normal(covariance: Array, rng: np.random.Generator) -> Array:
 def _runs(
     models: list[Model], states: Array, t: Array, kicks: Array, every: float, rng: np.random.Generator
 ) -> Array:
-    """The members' states at the model's times `t`, (n, k, d); NaN once a disk has left the wheels."""
+    """Run the members; return their states at the model's times `t`, (n, k, d), NaN after loss of contact."""
     n, d = states.shape
     rows = np.array([list(model.parameters.values()) for model in models])
     method = method_for(models[0], "auto", _RTOL)
@@ -457,16 +473,16 @@ def _runs(
             break
         times = np.unique(np.concatenate([[a], t[inside], [b]]))
         batch = Batch(models[0], rows[who], current[who], _RTOL, _ATOL, thread_count(None))
-        found = _core.ensemble(batch, times, method)
-        result[np.ix_(who, inside)] = found["states"][:, np.searchsorted(times, t[inside])]
-        current[who] = found["states"][:, -1]
-        alive[who] = found["outcome"] == FINISHED
+        batch_result = _core.ensemble(batch, times, method)
+        result[np.ix_(who, inside)] = batch_result["states"][:, np.searchsorted(times, t[inside])]
+        current[who] = batch_result["states"][:, -1]
+        alive[who] = batch_result["outcome"] == FINISHED
         current += np.sqrt((b - a) / 2) * kicks * rng.standard_normal((n, d))
     return result
 
 
 def _between_wheels(model: Model, states: Array) -> NDArray[np.bool_]:
-    """Which disks have not left the wheels, where that ends a run."""
+    """Return True for each disk still in contact with the wheels, if loss of contact ends a run."""
     inside = model.profile.dynamics.inside
     if inside is None or getattr(model, "edge", "ignore") != "stop":
         return np.ones(len(states), dtype=bool)
@@ -474,7 +490,7 @@ def _between_wheels(model: Model, states: Array) -> NDArray[np.bool_]:
 
 
 def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: Array, runs: Array) -> Array:
-    """What each member's camera sees of its states, (n, k, m)."""
+    """Compute the observations of each member's camera, (n, k, m)."""
     seen = []
     for model, camera, run in zip(models, cameras, runs, strict=True):
         there = np.isfinite(run).all(axis=1)
@@ -488,7 +504,7 @@ def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: 
 
 
 def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
-    """The band's lower edge, the median and the upper edge, where half of the members are still there."""
+    """Return lower edge, median and upper edge of the band, while half of the members still run."""
     tail = (1.0 - level) / 2.0
     there = np.isfinite(seen).all(axis=2).mean(axis=0) > 0.5
     result = np.full((3, *seen.shape[1:]), np.nan)
@@ -498,7 +514,7 @@ def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
 
 
 def _size(difference: Array, sensor: SensorProfile, spread: Array) -> Array:
-    """How far two motions are apart: a disk's centre, m; a pendulum's angle; else in units of the spread."""
+    """Return the distance of two motions: m of a disk's centre, a pendulum's rad, else per `spread`."""
     if not sensor.compared:
         result: Array = np.sqrt(np.mean((difference / spread) ** 2, axis=1))
         return result
@@ -507,7 +523,7 @@ def _size(difference: Array, sensor: SensorProfile, spread: Array) -> Array:
 
 
 def _parted(t: Array, size: Array, error: float) -> float:
-    """When a difference first exceeds the error, or the disk is gone; inf if never."""
+    """Return the time at which a difference first exceeds the error, or the disk's run ends; inf if never."""
     beyond = np.flatnonzero(~(size <= error))
     if not beyond.size:
         return math.inf
@@ -525,7 +541,7 @@ def _compared(
     spread: Array,
     error: float,
 ) -> float:
-    """When what was measured after the start first parts from the median, s after it; NaN if it does not."""
+    """Return when the measurement first diverges from the median, s after the start; NaN if it does not."""
     clock, median = expectation
     after = measurement.slice(float(np.nextafter(clock[0], np.inf)), float(clock[-1]))
     t = after.t
@@ -539,9 +555,9 @@ def _compared(
 
 
 def _growth(model: Model, states: Array, long: float) -> float:
-    """The Lyapunov time of the fitted model, s; of its equations, wherever their attractor goes."""
+    """Compute the Lyapunov time of the fitted model's equations, s; its attractor may lie beyond the edge."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a percent is enough for a unit of time
+        warnings.simplefilter("ignore")  # one percent is enough for a unit of time
         try:
             equations = beyond_the_edge(model)
             value, spread = lyapunov(equations, with_error=True, t=long, state0=np.median(states, axis=0))

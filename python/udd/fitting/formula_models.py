@@ -1,4 +1,4 @@
-"""What a fit needs to know of a user's own model: first guesses, and sizes taken from the record."""
+"""User-defined models in a fit: first guesses of states, and sizes from the record."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .sensor import roughness
 
 Array = NDArray[np.float64]
 
-#: The model's assumed error over a frame, from loose to tight, in units of the loosest. That is, as for disk
-#: and pendulum, a share of the noise of a state that is seen, but not less than a small share of what it
-#: changes by from frame to frame; of a state that is not seen it is a larger share of that.
+#: The assumed model error over a frame, from large to small, in units of the largest. For an observed state
+#: the largest is a share of its noise, as for disk and pendulum, but at least a small share of its change
+#: from frame to frame. For an unobserved state it is a larger share of that change.
 _LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
 _OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
-#: Samples of an input that may be missing at a measurement's ends, where the nearest one holds.
+#: Samples of an input that may be missing at a measurement's ends; the nearest sample is used there.
 _LATE = 2.0
-_NOISIER = 0.9  # of the frames are not noisier than what is taken for a channel's noise
-_SAMPLED = 50  # frames that tell how noise enters the states
+_NOISIER = 0.9  # quantile over the frames that counts as a channel's noise
+_SAMPLED = 50  # frames that show how noise enters the states
 
 
 def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
-    """The rate of what was seen, from neighbouring frames; zero where a frame has none."""
+    """Compute the rate of an observed column from neighbouring frames; zero if a frame has none."""
     rate = np.zeros(len(t))
     for run in np.split(np.arange(len(t)), np.flatnonzero(~linked) + 1):
         if len(run) > 1:
@@ -40,24 +40,24 @@ def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
 def driven(
     models: Sequence[FormulaModel], measurements: Sequence[Measurement], origin: float | None = None
 ) -> tuple[FormulaModel, ...]:
-    """Models with the inputs that their measurements hold, counted from each measurement's first row.
+    """Attach each measurement's inputs to its model, on a clock that starts at its first row.
 
-    Or from another time on the measurements' clock.
+    `origin` is another zero on the measurements' clock.
 
     Raises
     ------
     FitError
-        An input that a measurement lacks, or one that does not last as long as its rows.
+        A measurement lacks an input, or an input does not cover its rows.
     """
     records = []
     for model, measurement in zip(models, measurements, strict=True):
         signals = {}
         for name in model.inputs:
             if name not in measurement.inputs:
-                known = ", ".join(measurement.inputs) or "none"
-                raise FitError(f"the measurement lacks the model's input {name}; its inputs are {known}")
+                names = ", ".join(measurement.inputs) or "none"
+                raise FitError(f"the measurement lacks the model's input {name}; its inputs are: {names}")
             signal, (start, end) = measurement.inputs[name], measurement.t[[0, -1]].tolist()
-            # A sample may come just after a row that it belongs to.
+            # A sample may come just after the row that it belongs to.
             slack = _LATE * float(np.median(np.diff(signal.t)))
             if lacks := signal.lacks(start, end, slack, "measurement"):
                 raise FitError(f"the input {name} {lacks}")
@@ -74,10 +74,10 @@ def guessed(
     state0: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> Array:
-    """A first guess of all states: as seen, or the rate of one that is seen, or else zero.
+    """Guess all states: observed values, else the rate or the integral of an observed state, else zero.
 
-    Of hidden states that a start is given of, their own equations are followed from there, driven by what was
-    seen. What sensors saw is inverted first, each weighed by its `noise`.
+    Hidden states with a start value follow their own equations from there, driven by the observed columns.
+    Sensor readings are inverted first, each weighed by its `noise`.
     """
     if model.observe:
         seen = _behind(model, t, dict(seen), dict(noise or dict.fromkeys(seen, 1.0)), state0 or {})
@@ -102,11 +102,11 @@ def guessed(
 def _off_the_edge(
     model: FormulaModel, t: Array, states: Array, seen: Mapping[str, Array]
 ) -> dict[str, float]:
-    """Starts of hidden states whose law does not go on beyond zero, or is flat there, as of a tank's level.
+    """Return start values of hidden states with a law that is undefined or flat below zero.
 
-    They are as large as what is seen.
+    A tank's level is one. Each value is the typical size of the observations.
     """
-    columns = [np.abs(one) for one in seen.values()]
+    columns = [np.abs(column) for column in seen.values()]
     size = float(np.median(np.concatenate(columns))) if columns else 1.0
     hidden = [k for k, name in enumerate(model.state_names) if name not in seen and not states[:, k].any()]
     result = {}
@@ -125,22 +125,22 @@ def _behind(
     noise: dict[str, float],
     state0: Mapping[str, float],
 ) -> dict[str, Array]:
-    """The states that sensors show, each frame by itself."""
+    """Return the states that sensors show, each frame by itself."""
     start = np.array([state0.get(name, 0.0) for name in model.state_names])
-    found = inverted(model, t, seen, noise, start)
-    return {name: found.states[:, k] for k, name in enumerate(model.state_names) if found.shown[k]}
+    result = inverted(model, t, seen, noise, start)
+    return {name: result.states[:, k] for k, name in enumerate(model.state_names) if result.shown[k]}
 
 
 def _integral(t: Array, rate: Array, start: float | None) -> Array:
-    """A state whose rate alone is seen: from its start, or about zero."""
+    """Integrate a state of which only the rate is observed, from its start or about zero."""
     result: Array = cumulative_trapezoid(rate, t, initial=0.0)
     return result - result.mean() if start is None else result + start
 
 
 def _followed(model: FormulaModel, t: Array, states: Array, start: Mapping[str, float]) -> Array:
-    """States of which some follow their own equations from a start, by Heun's method from frame to frame.
+    """Let some states follow their own equations from a start, by Heun's method from frame to frame.
 
-    Where that runs away they stay as they were last.
+    If a state diverges it keeps its last value.
     """
     places = [model.state_names.index(name) for name in start]
     result = states.copy()
@@ -157,37 +157,35 @@ def _followed(model: FormulaModel, t: Array, states: Array, start: Mapping[str, 
 
 
 def checked_start(model: FormulaModel | None, state0: object) -> dict[str, float]:
-    """The starts of states that a user gave, by the states' names.
+    """Check the start values of states that a user gave, by the states' names.
 
     Raises
     ------
     FitError
-        They are no numbers of states of a model of the user's own.
+        A value is not a finite number, or not for a state of a user's own model.
     """
     if model is None:
         raise FitError(
-            "starts can be given for a model of your own; a disk's and a pendulum's show themselves"
+            "state0 is for a model of your own; a disk's and a pendulum's states are all observed: omit it"
         )
     if not isinstance(state0, Mapping):
-        raise FitError(f"state0 must be a table of states and their starts, not {state0!r}")
+        raise FitError(f"state0 must be a table of start values by state, not {state0!r:.80}")
     result = {}
     for name, value in state0.items():
         if name not in model.state_names:
-            raise FitError(
-                f"a start is given for {name!r}, but the states are {', '.join(model.state_names)}"
-            )
+            raise FitError(f"state0 has {name!r}, but the states are {', '.join(model.state_names)}")
         if (
             isinstance(value, bool)
             or not isinstance(value, (int, float, np.integer))
             or not np.isfinite(value)
         ):
-            raise FitError(f"the start of {name} must be a finite number, not {value!r}")
+            raise FitError(f"the start value of {name} must be a finite number, not {value!r}")
         result[str(name)] = float(value)
     return result
 
 
 def typical_noise(values: Array) -> Array:
-    """A measurement's noise as its roughness shows it, where it does not say."""
+    """Estimate a measurement's noise from its roughness, if it does not state one."""
     result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + 1e-300)
     return result
 
@@ -195,7 +193,7 @@ def typical_noise(values: Array) -> Array:
 def levels_of(
     model: FormulaModel, t: Array, states: Array, sigma: Array, linked: NDArray[np.bool_]
 ) -> tuple[tuple[float, ...], ...]:
-    """The model's assumed error, loose to tight, per square root of the unit of time.
+    """Return the assumed model errors, large to small, per square root of the unit of time.
 
     Parameters
     ----------
@@ -203,25 +201,25 @@ def levels_of(
     t, states : ndarray (n,), (n, d)
         A first guess.
     sigma : ndarray (n, c)
-        The noise of what was seen, of each of the model's channels; infinite where it was not.
+        The noise of the observations, for each of the model's channels; infinite if not observed.
     linked : ndarray of bool (n - 1,)
     """
     dt = np.diff(t)[linked]
     step = float(np.median(dt)) if len(dt) else 1.0
     change = np.sqrt((np.diff(states, axis=0)[linked] ** 2).sum(axis=0) / max(len(dt), 1))
-    # What is unknown altogether moves as the model says.
+    # An unknown state changes as the model says.
     rates = np.median(np.abs(model.rates(t, states)), axis=0) * step
     change = np.where(change > 0, change, rates)
     change = np.where(change > 0, change, float(change.max()) or 1.0)
     noise = state_noise(model, t, states, sigma)
     seen = np.isfinite(noise)
-    # Held by less than its noise a state that is seen would follow every frame.
+    # With a larger model error an observed state would follow every frame.
     loosest = np.where(seen, np.clip(_OF_NOISE * noise, _OF_CHANGE * change, change), _UNSEEN * change)
     return tuple(tuple((level * loosest / np.sqrt(step)).tolist()) for level in _LEVELS)
 
 
 def state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> Array:
-    """The noise of each state as sensors show it, (d,); infinite of those that they do not show."""
+    """Return the noise of each state as sensors show it, (d,); infinite if they do not show it."""
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(sigma).any(axis=0))
     typical = np.full(len(seen), np.inf)
     for k in np.flatnonzero(seen):
@@ -232,6 +230,6 @@ def state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> A
     names = [name for name, there in zip(model.channels, seen, strict=True) if there]
     values = dict(zip(names, model.observed(t[frames], states[frames])[:, seen].T, strict=True))
     noise = dict(zip(names, typical[seen].tolist(), strict=True))
-    found = inverted(model, t[frames], values, noise, states[0])
-    spread = np.sqrt(np.median((found.slopes**2 @ typical[seen] ** 2), axis=0))
-    return np.where(found.shown, spread, np.inf)
+    result = inverted(model, t[frames], values, noise, states[0])
+    spread = np.sqrt(np.median((result.slopes**2 @ typical[seen] ** 2), axis=0))
+    return np.where(result.shown, spread, np.inf)

@@ -1,4 +1,4 @@
-"""Innovations: what each frame adds to its prediction from the frames before; white if the model is right."""
+"""Innovations: each frame minus its prediction from the frames before; white if the model is right."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .problem import Fit
 Array = NDArray[np.float64]
 
 
-_FEWEST = 2  # innovations of a channel that say anything
+_FEWEST = 2  # innovations of a channel, from which on they are tested
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Innovations:
     dt : float
         Time between frames, s.
     values : ndarray (n, m)
-        NaN where nothing was seen or too little was known.
+        NaN if nothing was observed or the filter's state was still undetermined.
     """
 
     names: tuple[str, ...]
@@ -38,12 +38,12 @@ class Innovations:
 
     @property
     def chi2(self) -> Array:
-        """Mean square of every channel; 1 where model and noise are right."""
+        """Mean square of every channel; 1 if model and noise are right."""
         result: Array = np.nanmean(self.values**2, axis=0)
         return result
 
     def autocorrelation(self, lags: int) -> tuple[Array, Array]:
-        """Autocorrelation at lags 1 to `lags`, (lags, m), and its standard deviation for white noise."""
+        """Compute the autocorrelation at lags 1 to `lags`, (lags, m), and its s.d. for white noise."""
         seen = np.isfinite(self.values)
         x = np.where(seen, self.values - np.nanmean(self.values, axis=0), 0.0)
         power = (x**2).sum(axis=0) / seen.sum(axis=0)
@@ -52,22 +52,22 @@ class Innovations:
         return products / np.maximum(pairs, 1) / power, 1.0 / np.sqrt(np.maximum(pairs, 1))
 
     def ljung_box(self, lags: int) -> tuple[Array, Array]:
-        """Ljung and Box's statistic of every channel, and its probability for white noise."""
+        """Compute the Ljung-Box statistic of every channel, and its probability for white noise."""
         rho, sd = self.autocorrelation(lags)
-        q = ((rho / sd) ** 2).sum(axis=0)  # the pairs' number stands for n (n + 2)/(n - k), for gaps' sake
+        q = ((rho / sd) ** 2).sum(axis=0)  # because of gaps, the number of pairs replaces n (n + 2)/(n - k)
         return q, chi_squared.sf(q, lags)
 
 
 def innovations(fit: Fit) -> Innovations:
-    """The innovations of a fit: what was seen less what a Kalman filter foretold, parameters held.
+    """Compute the innovations of a fit: observations minus the predictions of a Kalman filter.
 
-    The filter runs along the fitted motion, where everything is linear, with the noise and the model error
-    that the fit assumed.
+    The parameters are fixed. The filter runs along the fitted motion, around which everything is linear, with
+    the noise and the model error that the fit assumed.
     """
     problem = replace(fit.problem, noise=fit.noise)
     vague = np.ptp(fit.states, axis=0).tolist()
     values = _core.innovations(replace(problem.at(fit.point), free=()), vague)
-    told = np.isfinite(values).sum(axis=0) >= _FEWEST
-    seen = [k for k in range(len(fit.channels)) if fit.record.observed[:, k].any() and told[k]]
+    is_tested = np.isfinite(values).sum(axis=0) >= _FEWEST
+    seen = [k for k in range(len(fit.channels)) if fit.record.observed[:, k].any() and is_tested[k]]
     names = tuple(fit.channels[k] for k in seen)
     return Innovations(names, float(np.median(np.diff(fit.record.t))), values[:, seen])

@@ -1,4 +1,4 @@
-"""Measured inputs whose samples scatter (errors in variables)."""
+"""Noise of measured inputs (errors in variables)."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ from udd.models.formula_model import FormulaModel
 
 from .record import Record
 
-__all__ = ["LEVELS_APART", "NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
+__all__ = ["LEVEL_RATIO", "NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
 
 Array = NDArray[np.float64]
 
-#: Times by which a model's error may differ from what the inputs' noise makes: its levels are as far apart.
-LEVELS_APART = 3.5
-#: Of an input's variance, from which on its noise is told: as much too small a factor of it may come out.
-_TOLD = 0.01
+#: Factor by which a model error may differ from that caused by the inputs' noise: the ratio of adjacent
+#: levels.
+LEVEL_RATIO = 3.5
+#: Share of an input's variance from which on its noise is reported: a factor of the input is biased by as
+#: much.
+_REPORTED_SHARE = 0.01
 _ORDERS = (4, 8)  # of the differences of samples
-_WHITE = 0.8  # of the noise by the lower order that the higher one must show
+_WHITE = 0.8  # share of the noise by the lower order that the higher order must show
 _SHORTEST = 50  # samples
-_LEVELS = 20  # different values of a drive that may be noisy
+_LEVELS = 20  # distinct values of an input, from which on it may be noisy
 
 
 @dataclass(frozen=True)
 class NoisyInput:
-    """An input whose samples scatter: its noise, and the share of its variance that this is."""
+    """An input with noisy samples: the noise, and its share of the input's variance."""
 
     name: str
     noise: float
@@ -39,21 +41,21 @@ class NoisyInput:
 
     @property
     def text(self) -> str:
-        """In a sentence."""
+        """The warning, in one sentence."""
         return (
-            f"warning: the input {self.name} scatters by {self.noise:.2g} from sample to sample; if that is "
-            f"noise of its sensor, what it drives comes out too small, by some {100 * self.share:.0f} %: "
-            "udd.input_bias(fit) estimates by how much"
+            f"warning: the input {self.name} has noise of {self.noise:.2g} per sample. If that is noise "
+            f"of its sensor, the fitted gain of this input is about {100 * self.share:.0f} % too small; "
+            "udd.input_bias(fit) estimates the bias"
         )
 
 
 def noise_of(signal: InputSignal) -> float:
-    """The noise of an input's samples; 0 where none is told from what the input does itself.
+    """Estimate the noise of an input's samples; 0 if it cannot be distinguished from the input's own changes.
 
-    Differences of a high order show what is left near the highest frequency that the samples hold. Noise of
-    a sensor is white there: orders agree. Of a drive that falls off before they do not. A drive that is white
-    itself cannot be told from noise by its samples: a held one, which a controller put out, and one of few
-    levels count as exact.
+    Differences of a high order show the power near the highest frequency of the samples. A sensor's noise is
+    white there, so different orders agree; they disagree for an input whose spectrum decays. A white input
+    cannot be distinguished from noise by its samples. An input with ``hold="zero"``, as from a controller,
+    and one with few levels count as exact.
     """
     if len(signal) < _SHORTEST or signal.hold == "zero" or len(np.unique(signal.values)) < _LEVELS:
         return 0.0
@@ -62,34 +64,34 @@ def noise_of(signal: InputSignal) -> float:
 
 
 def noise_by_differences(values: Array, order: int) -> float:
-    """The standard deviation of white noise that makes differences of this order as large as they are."""
+    """Compute the standard deviation of white noise with differences of this order as large as these."""
     size = np.median(np.abs(np.diff(values, order))) / 0.6745
     return float(size / np.sqrt(math.comb(2 * order, order)))
 
 
 def noisy_inputs(measurements: tuple[Measurement, ...], names: tuple[str, ...]) -> list[NoisyInput]:
-    """The inputs whose noise is more than a small share of what they drive with."""
-    found = []
+    """Return the inputs whose noise exceeds a small share of their variance."""
+    result = []
     for name in names:
-        noise = np.array([noise_of(one.inputs[name]) for one in measurements])
-        size = np.array([one.inputs[name].values.std() for one in measurements])
+        noise = np.array([noise_of(measurement.inputs[name]) for measurement in measurements])
+        size = np.array([measurement.inputs[name].values.std() for measurement in measurements])
         share = float(np.median((noise / np.where(size > 0, size, np.inf)) ** 2))
-        if share > _TOLD:
-            found.append(NoisyInput(name, float(np.median(noise)), min(share, 1.0)))
-    return found
+        if share > _REPORTED_SHARE:
+            result.append(NoisyInput(name, float(np.median(noise)), min(share, 1.0)))
+    return result
 
 
 def diffusion_by_noise(models: Sequence[Model], record: Record) -> Array:
-    """What the noise of inputs adds to the states' model error, per square root of the unit of time, (d,).
+    """Compute the model error caused by the inputs' noise, (d,), per square root of the unit of time.
 
-    Errors of samples that are independent add up as a random walk does, to first order.
+    To first order, independent errors of samples add up as in a random walk.
     """
     squares = np.zeros((len(models), record.states.shape[1]))
     there = np.unique(record.film)  # a part of a record may lack some measurements
     for film in there:
-        model, own = models[film], record.film == film
-        assert isinstance(model, FormulaModel)  # no other has inputs
-        t, states = record.t[own], record.states[own]
+        model, of_film = models[film], record.film == film
+        assert isinstance(model, FormulaModel)  # no other model has inputs
+        t, states = record.t[of_film], record.states[of_film]
         plain = model.rates(t, states)
         for name in model.inputs:
             signal = model.records[model.record][name]

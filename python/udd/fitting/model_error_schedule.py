@@ -10,41 +10,41 @@ import numpy as np
 from udd.errors import FitError
 from udd.measurement import Measurement
 
-from .noise import estimated, remembered
+from .noise import estimated, noise_autocorrelation
 from .problem import Fit, Point, Problem
 from .record import Record
 from .solve import DONE, done, solve
 
-#: Most steps at one level: a right model takes three to seven, but for kinks of its law.
+#: Maximum of steps at one level: a right model takes three to seven, or more if its law has kinks.
 STEPS = 30
-#: Steps in which a right model gets from one level to any other.
+#: Steps in which a right model converges at any other level.
 FEW = 12
-LEAP = 3  # levels that it takes at once
-#: Fall of chi2 below which a fit no longer changes what it says of the noise; its likelihood counts it.
+LEAP = 3  # levels that a right model can skip
+#: Decrease of chi2 below which a fit's noise no longer changes; its likelihood is then accurate enough.
 ROUGH = 10.0
-#: Nats by which the evidence may fall when the model is held more tightly.
+#: Decrease in evidence (nats) that is acceptable when the model error is reduced.
 LESS = 3.0
-_LITTLE = 3  # steps more, of a fit that may be near its minimum
+_LITTLE = 3  # further steps for a fit that may be close to its minimum
 _FAR_OFF = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
-_LOOSE = 0.3  # leverage from which on misfits are not the noise
-_SAME = 0.03  # autocorrelations that differ by less need no other fit
+_LOOSE = 0.3  # leverage above which misfits do not show the noise
+_SAME = 0.03  # autocorrelations that differ by less need no further fit
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What a fit must reach to be of use.
+    """Targets that a fit must reach to be useful.
 
     Attributes
     ----------
     level : int
-        How tightly the model must be held at the end: below it the fit is not brought to its minimum. Nor
-        is, there, what is far from explaining the data, which is not held more tightly either.
+        Level of model error to reach: at a larger model error the fit is not brought to its minimum. If it is
+        then far from explaining the data, it stops there.
     chi2 : float
-        At most that, there: it only rises on the way, so a fit above it is given up.
+        Upper limit at that level. chi2 only rises on the way, so a fit above it is abandoned.
     lost : float
-        A fit above it that does not converge is given up, as far as the level `rival`.
+        A fit above this chi2 that does not converge is abandoned, up to the level `rival`.
     rival : int
-        How tightly a fit is held whose chi2 is far below `lost`.
+        Level of a fit whose chi2 is far below `lost`.
     """
 
     level: int = 0
@@ -53,7 +53,7 @@ class Goal:
     rival: int = 0
 
 
-#: Whatever a fit comes to is of use.
+#: No target: every fit is useful.
 ANY = Goal()
 
 
@@ -66,11 +66,11 @@ def reduce_model_error(
     steps: int = STEPS,
     goal: Goal = ANY,
 ) -> Fit:
-    """Homotopy in the model-error variance: solve, reduce it, solve again from there.
+    """Minimise with a decreasing model-error variance: solve, reduce it, solve again from there.
 
-    It ends at the level where the minimiser no longer converges, which a wrong model reaches early, or, if
-    the problem asks for the likeliest level, where the evidence falls. `best` is a fit at a larger model
-    error; it is returned if no tighter one converges. `steps` bounds the iterations at each level.
+    It ends at the level where the minimiser no longer converges, which a wrong model reaches early. If the
+    problem asks for the most probable level, it ends where the evidence falls. `best` is a fit at a larger
+    model error; it is returned if no tighter one converges. `steps` bounds the iterations at each level.
 
     Raises
     ------
@@ -101,70 +101,70 @@ def reduce_model_error(
 
 
 def _give_up_above(goal: Goal, best: Fit) -> None:
-    """Give up a fit that is above its goal already."""
+    """Abandon a fit that is already above its goal."""
     above = best.level <= goal.level and best.chi2 > goal.chi2
     lost = best.level <= goal.rival and best.chi2 > goal.lost and not best.converged
     if above or lost:
-        raise FitError("the model explains less than another one that is held as tightly")
+        raise FitError("the model explains less than another one with the same model error")
 
 
 def _explains_little(best: Fit, goal: Goal) -> bool:
-    """Whether a fit with a goal is as tight as that asks, and far from explaining the data."""
+    """Return True if a fit has reached its goal's level and is far from explaining the data."""
     tight = goal != ANY and best.level >= goal.level
     return tight and best.converged and far_off(best)
 
 
 def far_off(fitted: Fit) -> bool:
-    """Whether a fit is far from explaining the data."""
+    """Return True if a fit is far from explaining the data."""
     return fitted.scatter > _FAR_OFF
 
 
 def beyond_schedule(fitted: Fit) -> bool:
-    """Whether a fit has more model error than the largest of its schedule."""
+    """Return True if a fit has more model error than the largest of its schedule."""
     return fitted.problem.diffusion not in fitted.problem.schedule
 
 
 def provisional_fit(
     measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = STEPS
 ) -> Fit:
-    """A fit on the way to tighter ones; where its likelihood is of interest, with the noise's memory."""
+    """Fit on the way to a smaller model error; with noise autocorrelation if its likelihood matters."""
     result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)), iterations)
     return with_noise_correlation(result) if problem.likeliest and result.converged else result
 
 
 def _nearly(fitted: Fit, steps: int) -> Fit:
-    """A fit of a search that came near its minimum, which is enough to test it, or else as it was.
+    """Return a search's fit at its minimum if that is close, else unchanged: close is enough to test it.
 
-    Along what the data hardly determine, like a frequency beside its phase, a law with kinks gets there in
-    ever smaller steps. To turn a right model away for it would make room for a wrong one. What is given few
-    `steps`, because it may have no end, is taken at its word.
+    Along directions that the data hardly determine, such as a frequency and its phase, a law with kinks
+    converges in ever smaller steps. To reject a right model for that would favour a wrong one. A fit with few
+    `steps`, which may not converge at all, is not continued.
     """
     if fitted.converged or fitted.problem.likeliest or steps < STEPS:
         return fitted
-    near = solve(fitted.measurements, fitted.problem, fitted.point, _LITTLE, ROUGH)
-    return near if near.converged else fitted
+    continued = solve(fitted.measurements, fitted.problem, fitted.point, _LITTLE, ROUGH)
+    return continued if continued.converged else fitted
 
 
 def _is_last(problem: Problem) -> bool:
-    """Whether the model is held as tightly as it can be."""
+    """Return True if the model error is the smallest of the schedule."""
     return problem.diffusion == problem.schedule[-1]
 
 
 def _enough(problem: Problem) -> float:
-    """How far a fit goes: to the end at the last level."""
+    """Return the decrease of chi2 at which a fit stops: the final one at the last level."""
     return DONE if _is_last(problem) else ROUGH
 
 
 def _stands(tighter: Fit, looser: Fit) -> bool:
-    """Whether a fit that is held more tightly takes the place of a looser one."""
+    """Return True if a fit with a smaller model error replaces one with a larger."""
     less_likely = tighter.problem.likeliest and tighter.evidence < looser.evidence - LESS
     return tighter.converged and not less_likely
 
 
 def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit | None:
-    """The fit at the last level, over a few others: a right model gets from one to the next in few steps.
+    """Try to skip levels up to the last one: a right model converges from one level to the next in few steps.
 
-    None where it does not; what it came to on the way is then no good start.
+    Return None if it does not converge; its last point is then no good start.
     """
     for diffusion in levels[(len(levels) - 1) % LEAP :: LEAP]:
         try:
@@ -178,7 +178,7 @@ def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -
 
 
 def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
-    """The fit held more loosely again, level by level, as long as that is likelier."""
+    """Increase the model error again, level by level, as long as the evidence rises."""
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
         problem = fitted.problem.with_model_error(diffusion)
         looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
@@ -189,9 +189,9 @@ def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> F
 
 
 def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fit:
-    """The end of a rough fit, or where it has none in sight that of a looser one."""
-    own = fitted.problem.diffusion
-    for diffusion in (own, *reversed(levels[: levels.index(own)] if own in levels else ())):
+    """Converge a rough fit, or if that fails one with a larger model error."""
+    current = fitted.problem.diffusion
+    for diffusion in (current, *reversed(levels[: levels.index(current)] if current in levels else ())):
         problem = fitted.problem.with_model_error(diffusion)
         fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps, done(fitted)), steps)
         if fitted.converged:
@@ -200,16 +200,16 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
 
 
 def with_noise_correlation(fitted: Fit) -> Fit:
-    """The same with noise that remembers itself, where the record makes that likelier.
+    """Refit with AR(1) noise if that raises the likelihood.
 
-    Frames whose noise goes together are worth less than independent ones: without this the model would be
-    held too loosely, to follow the noise, and standard errors would be too small.
+    Frames with correlated noise carry less information than independent ones. Without this the model error
+    would be too large, following the noise, and standard errors would be too small.
     """
     if fitted.leverage > _LOOSE:
         return fitted
-    # Without this k0, k2 of a record with coloured noise move by three of their standard errors.
+    # Without this k0 and k2 of a record with coloured noise move by three standard errors.
     sd = fitted.noise.sd(fitted.record, fitted.blurring)
-    memory = remembered(fitted.record, fitted.misfit, sd, fitted.noise.weight)
+    memory = noise_autocorrelation(fitted.record, fitted.misfit, sd, fitted.noise.weight)
     if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
         return fitted
     noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
@@ -222,8 +222,8 @@ def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
     """Increase the model-error variance until chi2 per degree of freedom is below a limit.
 
     With a small model error a wrong model distorts states and parameters. With a larger one its residuals
-    show what is missing. Where the fit is far from explaining the data with the largest of the schedule, the
-    error is increased tenfold beyond it, twice at most; such a fit has no level.
+    show what is missing. If even the largest of the schedule leaves the fit far from explaining the data, the
+    error is increased tenfold, twice at most; such a fit has no level.
     """
     schedule, result = fitted.problem.schedule, fitted
     for diffusion in reversed(schedule[: fitted.level]):
@@ -239,7 +239,7 @@ def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
 
 
 def at_level(fitted: Fit, level: int) -> Fit:
-    """The same model, held as tightly as a level of the schedule says."""
+    """Fit the same model at a level of the schedule."""
     if level == fitted.level:
         return fitted
     problem = fitted.problem.with_model_error(fitted.problem.schedule[level])
@@ -247,7 +247,7 @@ def at_level(fitted: Fit, level: int) -> Fit:
 
 
 def with_noise_of(fitted: Fit, other: Fit) -> Fit:
-    """The same model, the noise as another fit of the same data has it: then their chi2 compare."""
+    """Fit the same model with the noise of another fit of the same data, so that chi2 can be compared."""
     if fitted.problem.noise is other.problem.noise:
         return fitted
     problem = replace(fitted.problem, noise=other.problem.noise)
@@ -255,15 +255,15 @@ def with_noise_of(fitted: Fit, other: Fit) -> Fit:
 
 
 def eased(fitted: Fit) -> Fit:
-    """The same model, held as loosely as is likeliest, from where a fit ended."""
+    """Fit the same model at the most probable model error, starting at the end of a fit."""
     problem = replace(fitted.problem, likeliest=True)
     return _increase_model_error(replace(fitted, problem=problem), problem.schedule)
 
 
 def smoothed_states(fitted: Fit, record: Record, level: int) -> Fit:
-    """The states of another record alone, with all parameters of a fit held, as tightly as a level says.
+    """Estimate the states of another record, with all parameters fixed, at a level of the schedule.
 
-    A wrong model may not get that far: the level of the result says how far it got.
+    A wrong model may not reach that level; the result's level says how far it came.
     """
     problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
     problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))

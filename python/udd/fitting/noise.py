@@ -16,33 +16,33 @@ from .record import Record
 
 Array = NDArray[np.float64]
 
-#: A frame farther out than this share of honest frames counts less (Huber).
+#: Share of frames with normal noise below the Huber threshold; a frame beyond it counts less.
 _HONEST = 0.99
-#: Standard errors by which an autocorrelation is no chance, and from where on it is motion.
+#: Standard errors above which an autocorrelation is significant, and the value above which it is motion.
 _SURE, _MOTION = 4.0, 0.8
 #: Frequencies over which the misfits' power is averaged.
 _BAND = 17
-#: Share of a channel's largest number below which a computed motion has no digits: no noise is smaller.
+#: Relative precision of computed motion, as a share of a channel's largest number: no noise is smaller.
 _EXACT = 1e-12
 
 
 @dataclass(frozen=True, repr=False)
 class Noise(OneLine):
-    """How far a measurement is from what it measures.
+    """Noise of a measurement.
 
     The variance of a channel is ``(factor sigma)^2 + (blur Omega)^2``, where ``sigma`` is what the
-    measurement states: noise often grows with the speed.
+    measurement states; noise often grows with the speed.
 
     Attributes
     ----------
     factor : ndarray (m,)
-        By what the stated standard deviations are multiplied.
+        Factors on the stated standard deviations.
     blur : ndarray (m,)
         Growth with the angular speed, in the channel's unit per rad/s.
     weight : ndarray (n,)
-        How much each frame counts: 1, or less for an outlier.
+        Weight of each frame: 1, or less for an outlier.
     memory : ndarray (m,)
-        How much of a frame's noise is still there in the next one: its autocorrelation.
+        Lag-1 autocorrelation of the noise.
     """
 
     factor: Array
@@ -51,16 +51,16 @@ class Noise(OneLine):
     memory: Array
 
     def everywhere(self, frames: int) -> Noise:
-        """The same noise in another record, in which no frame is odd."""
+        """Return the same noise for another record, without outliers."""
         return replace(self, weight=np.ones(frames))
 
     def sd(self, record: Record, omega: Array) -> Array:
-        """Standard deviation of every frame and channel, (n, m)."""
+        """Return the standard deviation of every frame and channel, (n, m)."""
         variance: Array = (self.factor * record.sigma) ** 2 + (self.blur * omega[:, None]) ** 2
         return np.sqrt(variance)
 
     def information(self, record: Record, omega: Array) -> Array:
-        """Inverse covariance of every frame, (n, m, m), outliers weighted down; zero where not seen."""
+        """Return the inverse covariance of every frame, (n, m, m), weighted; zero if not observed."""
         sd = self.sd(record, omega)
         seen = np.isfinite(sd)
         scale = np.where(seen, 1.0 / np.where(seen, sd, 1.0), 0.0)
@@ -68,27 +68,27 @@ class Noise(OneLine):
         return result
 
     def beyond(self, record: Record, omega: Array, factor: float) -> bool:
-        """Whether any channel is noisier than stated by more than a factor, in the median."""
+        """Return True if the median noise of any channel exceeds the stated one by more than a factor."""
         sd, seen = self.sd(record, omega), record.observed
         ratios = [sd[use, m] / record.sigma[use, m] for m, use in enumerate(seen.T)]
         return any(float(np.median(ratio)) > factor for ratio in ratios if len(ratio))
 
     def like(self, other: Noise, record: Record, omega: Array) -> bool:
-        """Whether two noises agree to 3 % in the median."""
+        """Return True if two noises agree to 3 % in the median."""
         seen = record.observed
         ratio = self.sd(record, omega)[seen] / other.sd(record, omega)[seen]
         return bool(abs(np.median(ratio) - 1.0) < 0.03)
 
 
 def stated(record: Record) -> Noise:
-    """The noise that the measurement itself states; odd frames do not count."""
+    """Return the noise that the measurement states; outliers get weight 0."""
     channels = record.seen.shape[1]
     weight = np.where(record.odd, 0.0, 1.0)
     return Noise(np.ones(channels), np.zeros(channels), weight, np.zeros(channels))
 
 
 def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array, before: Noise) -> Noise:
-    """The noise that a fit's misfits show.
+    """Estimate the noise from a fit's misfits.
 
     Parameters
     ----------
@@ -96,9 +96,9 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     omega : ndarray (n,)
         Angular velocity, rad/s.
     misfit : ndarray (n, m)
-        What was seen less what was fitted.
+        Observations minus fitted values.
     seen_variance : ndarray (n, m)
-        Variance of what was fitted; the misfits are smaller than the noise by it.
+        Variance of the fitted values; the squared misfits are smaller than the noise by it.
     before : Noise
         The noise that the fit assumed.
     """
@@ -106,20 +106,20 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     assumed = before.sd(record, omega)
     distance = _distance(record, misfit, assumed)
     channels = seen.sum(axis=1).clip(1)
-    # What is far out is judged by the typical frame: the noise may be stated wrongly.
+    # Outliers are judged by the typical frame, because the stated noise may be wrong.
     numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
     typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi_squared.ppf(0.5, numbers))
     limit = (np.sqrt(chi_squared.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
     weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
-    # The variance comes from the frames within the limit, where honest noise would show this share of its
-    # own.
+    # The variance comes from the frames within the limit, in which normal noise has this share of its
+    # variance.
     shown = (chi_squared.cdf(chi_squared.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]
     factor, blur = np.ones(misfit.shape[1]), np.zeros(misfit.shape[1])
     for m in range(misfit.shape[1]):
         use = seen[:, m] & (weight == 1.0)
         if not use.any():
-            continue  # a state that is not seen
-        # A fit follows its data: each squared misfit is smaller than the noise's by the fit's leverage.
+            continue  # an unobserved state
+        # A fit follows its data: each squared misfit is smaller than that of the noise by the fit's leverage.
         variance = assumed[use, m] ** 2
         leverage = seen_variance[use, m] / variance
         power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)
@@ -135,19 +135,19 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     return Noise(factor, blur, weight, before.memory)
 
 
-def remembered(record: Record, misfit: Array, sd: Array, weight: Array) -> Array:
-    """How much of the noise the misfits remember from frame to frame, per channel.
+def noise_autocorrelation(record: Record, misfit: Array, sd: Array, weight: Array) -> Array:
+    """Estimate the lag-1 autocorrelation of the noise, per channel.
 
-    None where chance explains it, and none where it would last for many frames: that is motion, which the
-    model lacks.
+    It is 0 if it is not significant, and 0 if it would last for many frames: that is motion that the model
+    lacks.
 
     Parameters
     ----------
     record : Record
     misfit, sd : ndarray (n, m)
-        Misfits of a model that is held tightly, and the noise's standard deviation.
+        Misfits of a model with a small model error, and the noise's standard deviation.
     weight : ndarray (n,)
-        Frames that are farther out than honest ones say nothing.
+        Weights of the frames; outliers (below 1) are left out.
     """
     there = record.observed & (weight == 1.0)[:, None]
     scaled = np.divide(misfit, sd, out=np.zeros(misfit.shape), where=there)
@@ -160,7 +160,7 @@ def remembered(record: Record, misfit: Array, sd: Array, weight: Array) -> Array
 
 
 def _distance(record: Record, misfit: Array, sd: Array) -> Array:
-    """How many standard deviations each frame is off."""
+    """Return the distance of each frame in standard deviations."""
     normal = np.where(np.isfinite(sd), misfit / np.where(np.isfinite(sd), sd, 1.0), 0.0)
     squared = np.einsum("ni,nij,nj->n", normal, record.unmixing, normal)
     result: Array = np.sqrt(np.maximum(squared, 0.0))
@@ -168,16 +168,16 @@ def _distance(record: Record, misfit: Array, sd: Array) -> Array:
 
 
 def colour(misfit: Array, signature: Array) -> float:
-    """How much stronger misfits are at the frequencies where an effect shows than on average, at least 1.
+    """Compare the misfits' power at an effect's frequencies with their mean power; at least 1.
 
-    Misfits that go together for many frames, like those of a lens, look like an effect more easily than white
-    noise.
+    Misfits that are correlated over many frames, such as those of a lens, resemble an effect more than white
+    noise does.
 
     Parameters
     ----------
     misfit, signature : ndarray (n, m)
-        The misfits of a fit with the effect, and by how much they differ from those without it, both in units
-        of the noise; NaN where nothing was seen. The worst channel counts.
+        Misfits of a fit with the effect, and their difference from those without it, both in units of the
+        noise; NaN if nothing was observed. The worst channel counts.
     """
     worst = 1.0
     for e, s in zip(np.nan_to_num(misfit).T, np.nan_to_num(signature).T, strict=True):

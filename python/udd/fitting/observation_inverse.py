@@ -1,4 +1,4 @@
-"""A first guess of states from what sensors saw: the output equation inverted, frame by frame."""
+"""First guess of states from sensor readings: invert the output equation frame by frame."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ Array = NDArray[np.float64]
 
 _STEP = 1e-5  # of a difference quotient
 _FIRST, _NEXT = 30, 3  # Gauss-Newton steps of the first frame, and of those after it
-_RESOLVED = 0.9  # diagonal of the resolution matrix from which on a state is told by the sensors
-_SINGULAR = 1e-3  # relative singular value below which a combination of states is not seen
+_RESOLVED = 0.9  # diagonal of the resolution matrix from which on the sensors determine a state
+_SINGULAR = 1e-3  # relative singular value below which a combination of states is not observed
 _FARTHEST = 1.0  # rad or unit: the longest step
 
 
 class Inverted(NamedTuple):
-    """States as sensors show them.
+    """States as the sensors show them.
 
     Attributes
     ----------
     states : ndarray (n, d)
-        Zero, or as they started, where nothing shows them.
+        Zero, or their start values, if no sensor shows them.
     shown : ndarray of bool (d,)
         Which states the sensors of one frame show.
     slopes : ndarray (n, d, c)
-        By what each state changes with each sensor.
+        Derivatives of each state by each sensor.
     """
 
     states: Array
@@ -47,11 +47,11 @@ def inverted(
     model : FormulaModel
     t : ndarray (n,)
     seen : dict of str to ndarray (n,)
-        What some of the sensors saw, without gaps.
+        Readings of some of the sensors, without gaps.
     noise : dict of str to float
-        Their noise, which weighs them.
-    start : ndarray (d,)
-        Where the first frame starts.
+            Their noise, which determines their weights.
+        start : ndarray (d,)
+            First guess for the first frame.
     """
     model = model._with(delays=tuple(pair for pair in model.delays if pair[0] in model.inputs))
     columns = [model.channels.index(name) for name in seen]
@@ -69,7 +69,7 @@ def inverted(
                 asked = ", ".join(f"'{name}': ..." for name in model.state_names)
                 where = ", ".join(f"{n} = {x:.3g}" for n, x in zip(model.state_names, now, strict=True))
                 raise FitError(
-                    f"what the sensors see has no value around {where}: say where the motion starts, "
+                    f"the sensors have no value around {where}: say where the motion starts, "
                     f"state0={{{asked}}}"
                 )
             jacobian = (around[1 : d + 1] - around[d + 1 :]).T / (2.0 * _STEP) * weights[:, None]

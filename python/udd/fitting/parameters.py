@@ -1,4 +1,4 @@
-"""Which parameters a fit leaves free, and what is known of them beforehand."""
+"""Free parameters of a fit and their priors."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from udd.models import Model
 
 @dataclass(frozen=True)
 class Free:
-    """A free parameter: its name, what it belongs to, and its Gaussian prior.
+    """Free parameter: its name, its owner, and its Gaussian prior.
 
     Attributes
     ----------
     name : str
-        Followed by the number of the film in brackets where it belongs to one of several.
+        Followed by the number of the film in brackets if it belongs to one of several.
     role : str
         ``"model"``, ``"camera"`` or ``"clock"``.
     index : int
@@ -28,7 +28,7 @@ class Free:
     mean, sd : float
         The prior; an infinite standard deviation for none.
     film : int or None
-        The film that it belongs to; None where all share it.
+        The film that it belongs to; None if all share it.
     """
 
     name: str
@@ -46,55 +46,55 @@ def free_parameters(
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
 ) -> tuple[Free, ...]:
-    """The free parameters of a fit.
+    """Return the free parameters of a fit.
 
     Parameters
     ----------
     models : sequence of Disk or Pendulum
-        One per film; their values are the priors' means.
+        One per film; their values are the means of the priors.
     free : iterable of str, optional
         Names of the model's free parameters. By default ``k0, k1, k2, W`` of a disk, ``k0, length, inertia``
         of a pendulum, and the amplitudes of all effects.
     camera : bool or iterable of str
-        Whether the camera's parameters are free, or which.
+        Whether the camera's parameters are free, or the names of those that are.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional
-        The model's parameters that every film has a value of its own of; by default the drive ``W``. Those of
-        the camera always are.
+        Parameters of the model with a separate value for every film; default: the drive ``W``. Those of the
+        camera always have one.
 
     Raises
     ------
     FitError
-        A name that the model or the camera does not have, or a prior that is none.
+        A name is not one of the model's or the camera's, or a prior is invalid.
     """
     model = models[0]
     values = model.parameters
     names = list(_spread(model)) + _amplitudes(model) if free is None else names_of("free", free)
     sensor = model.profile.sensor
-    known = {**sensor.camera, **({} if sensor.clock is None else {"clock": sensor.clock})}
-    wanted = list(known) if camera is True else [] if camera is False else names_of("camera", camera)
+    camera_priors = {**sensor.camera, **({} if sensor.clock is None else {"clock": sensor.clock})}
+    wanted = list(camera_priors) if camera is True else [] if camera is False else names_of("camera", camera)
     twice = {name for name in [*names, *wanted] if [*names, *wanted].count(name) > 1}
     if twice:
-        raise FitError(f"{', '.join(sorted(twice))} is named twice")
-    own = set(model.profile.fit.each if each is None else names_of("each", each))
-    for name in [*names, *(own if each is not None else ())]:
+        raise FitError(f"{', '.join(sorted(twice))} is named twice; name it once")
+    film_specific = set(model.profile.fit.each if each is None else names_of("each", each))
+    for name in [*names, *(film_specific if each is not None else ())]:
         if name not in values:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(values)}")
     for name in wanted:
-        if name not in known:
-            raise FitError(f"the camera has no parameter {name!r}; it has {', '.join(known)}")
+        if name not in camera_priors:
+            raise FitError(f"the camera has no parameter {name!r}; it has {', '.join(camera_priors)}")
 
     several = len(models) > 1
     order, cameras = list(values), [name for name, _unit in _core.camera_parameters(model.kind)]
     result = []
     for name in names:
-        films = range(len(models)) if several and name in own else [None]
+        films = range(len(models)) if several and name in film_specific else [None]
         for film in films:
             of = models[film or 0]
             spread = _spread(of)
             if free is None and name not in spread and name not in _amplitudes(of):
-                continue  # a drive at rest
+                continue  # a drive of zero stays fixed
             label = name if film is None else f"{name}[{film}]"
             sd = np.inf if name in _amplitudes(of) else spread.get(name, np.inf)
             result.append(Free(label, "model", order.index(name), of.parameters[name], sd, film))
@@ -102,17 +102,17 @@ def free_parameters(
         for name in wanted:
             role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
             label = f"{name}[{film}]" if several else name
-            result.append(Free(label, role, index, 0.0, known[name], film if several else None))
+            result.append(Free(label, role, index, 0.0, camera_priors[name], film if several else None))
     return _with_priors(result, dict(priors or {}))
 
 
 def names_of(option: str, given: Iterable[str]) -> list[str]:
-    """The names that an option lists.
+    """Check and return the names that an option lists.
 
     Raises
     ------
     FitError
-        It is no list, or a name alone.
+        The option is not a list, or it is a single name.
     """
     if isinstance(given, str):
         raise FitError(f'{option} must be a list of names, not a name: {option}=["{given:.80}"]')
@@ -125,15 +125,15 @@ def names_of(option: str, given: Iterable[str]) -> list[str]:
 
 
 def known_camera(kind: str, meta: Mapping[str, Any]) -> list[float]:
-    """The camera's parameters before a fit: it gets nothing wrong, and its picture's middle is as said.
+    """Return the camera's parameters before a fit: no errors, and the picture's middle as stated.
 
     Raises
     ------
     FitError
-        ``middle`` is said, but is not two finite numbers.
+        ``middle`` is stated, but is not two finite numbers.
     """
-    known = dict.fromkeys((name for name, _unit in _core.camera_parameters(kind)), 0.0)
-    if "middle_y" in known and meta.get("middle") is not None:
+    camera = dict.fromkeys((name for name, _unit in _core.camera_parameters(kind)), 0.0)
+    if "middle_y" in camera and meta.get("middle") is not None:
         try:
             y, z = (float(x) for x in meta["middle"])
         except (TypeError, ValueError):
@@ -142,40 +142,44 @@ def known_camera(kind: str, meta: Mapping[str, Any]) -> list[float]:
             raise FitError(
                 f"the picture's middle must be two numbers [m], both finite, not {meta['middle']!r}"
             )
-        known |= {"middle_y": y, "middle_z": z}
-    return list(known.values())
+        camera |= {"middle_y": y, "middle_z": z}
+    return list(camera.values())
 
 
 def _amplitudes(model: Model) -> list[str]:
-    """The amplitudes of a model's effects."""
+    """Return the names of the amplitudes of a model's effects."""
     return [f"{e.name}.{p}" for e in model.effects for p in e.amplitudes]
 
 
 def _spread(model: Model) -> dict[str, float]:
-    """The standard deviations of the priors of what is free by default."""
+    """Return the standard deviations of the priors of parameters that are free by default."""
     values = model.parameters
     priors = model.profile.fit.priors
     if priors is None:
         return {name: np.inf for name in values if name not in _amplitudes(model)}
-    # A drive at rest is at rest.
+    # A drive of zero stays fixed.
     free = [name for name in priors if name != model.profile.dynamics.drive or values[name]]
-    known = {name: priors[name] * abs(values[name]) if np.isfinite(priors[name]) else np.inf for name in free}
-    return {name: sd if sd > 0 else np.inf for name, sd in known.items()}
+    spread = {
+        name: priors[name] * abs(values[name]) if np.isfinite(priors[name]) else np.inf for name in free
+    }
+    return {name: sd if sd > 0 else np.inf for name, sd in spread.items()}
 
 
 def _with_priors(free: list[Free], given: dict[str, tuple[float, float]]) -> tuple[Free, ...]:
-    """The parameters with the priors given, by their names or by what stands before the brackets."""
+    """Replace the priors that are given by a parameter's name, or by its part before the brackets."""
     for name, prior in given.items():
         if not (isinstance(prior, (tuple, list)) and len(prior) == 2):
-            raise FitError(f"the prior of {name} must be a mean and a standard deviation, not {prior!r}")
+            raise FitError(f"the prior of {name} must be a mean and a standard deviation, not {prior!r:.80}")
         mean, sd = prior
         if not (np.isfinite(mean) and sd > 0):
             raise FitError(
-                f"the prior of {name} needs a finite mean and a standard deviation that must be positive"
+                f"the prior of {name} needs a finite mean and a positive standard deviation, not {mean}, {sd}"
             )
     unknown = set(given) - {f.name for f in free} - {f.name.split("[")[0] for f in free}
     if unknown:
-        raise FitError(f"a prior is given for {', '.join(sorted(unknown))}, which is not free")
+        raise FitError(
+            f"priors has {', '.join(sorted(unknown))}, which is not free; add it to free or drop it"
+        )
     result = []
     for f in free:
         mean, sd = given.get(f.name, given.get(f.name.split("[")[0], (f.mean, f.sd)))

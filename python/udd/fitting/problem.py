@@ -1,4 +1,4 @@
-"""The weighted least-squares problem of a fit, and its result."""
+"""Weighted least-squares problem of a fit, and its result."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_FRAME = 0.04  # s, over which the profiles state the model's assumed error
-#: A fit whose leverage is larger follows each frame.
+_FRAME = 0.04  # s, the time over which the profiles state the assumed model error
+#: Leverage above which a fit follows each frame.
 FOLLOWS = 0.7
 
 
 def levels(kind: str) -> tuple[tuple[float, ...], ...]:
-    """The model's assumed error, loose to tight, per square root of a second."""
+    """Return the assumed model errors, large to small, per square root of a second."""
     return tuple(tuple(q / _FRAME**0.5 for q in level) for level in profile_of(kind).fit.model_error)
 
 
 @dataclass(frozen=True, repr=False)
 class Problem(OneLine):
-    """Measurements laid out for a model, with everything that a solve needs but its start.
+    """Measurements prepared for a model: all inputs of a solve except its start.
 
     Attributes
     ----------
     models : tuple of Model
-        One per film, alike but for their parameters' values.
+        One per film; they differ only in parameter values.
     likeliest : bool
-        Whether the model is held as tightly as is likeliest; else as tightly as it can be.
+        Whether the model error is the most probable one; else it is as small as possible.
     """
 
     models: tuple[Model, ...]
@@ -64,11 +64,11 @@ class Problem(OneLine):
     likeliest: bool = True
 
     def with_model_error(self, diffusion: tuple[float, ...]) -> Problem:
-        """The same with the model held this tightly: its assumed error, per square root of a second."""
+        """Return the problem with another model error, per square root of a second."""
         return replace(self, diffusion=diffusion)
 
     def at(self, point: Point) -> EstimatorInput:
-        """The problem at a point, as the core's estimator reads it."""
+        """Return the problem at a point, as input of the core's estimator."""
         observations = Observations.of(self.record, self.noise, point.states[:, 0])
         return EstimatorInput(
             self.models[0], observations, point.states, point.sets, self.free, self.diffusion, point.linear
@@ -82,8 +82,8 @@ class Point(OneLine):
     Attributes
     ----------
     linear : Linearised, optional
-        The record linearised there, where a solve came to it: who asks for more there need not do it again.
-        It does not go with a pickle or a copy.
+        The record linearised there, if a solve computed it: further results need not compute it again. It is
+        left out of a pickle or a copy.
     """
 
     states: Array
@@ -94,52 +94,59 @@ class Point(OneLine):
         return {**self.__dict__, "linear": None}
 
     def bare(self) -> Point:
-        """The same without what a solve left there."""
+        """Return the point without its linearisation."""
         return Point(self.states, self.sets)
 
     def value(self, free: Free) -> float:
-        """The value of a free parameter."""
+        """Return the value of a free parameter."""
         model, camera, clock = self.sets[free.film or 0]
         return {"model": model, "camera": camera}[free.role][free.index] if free.role != "clock" else clock
 
 
 @dataclass(frozen=True, eq=False)
 class Fit(Drawable):
-    """A model fitted to a measurement, or to several.
+    """Result of fitting a model to a measurement, or to several.
 
     Attributes
     ----------
     models : tuple of Model
         With the fitted parameters, one per measurement.
     parameters : dict of str to float
-        The free parameters, the camera's included; those that only one of several measurements has are
-        followed by its number in brackets.
+        The free parameters, the camera's included. Those of one of several measurements are followed by its
+        number in brackets.
     errors : dict of str to float
         Their standard errors.
     covariance : ndarray (p, p)
         In the order of `parameters`.
     chi2, dof : float
-        Sum of squares in units of the assumed noise and model error, and what it should be.
+        Sum of squares in units of the assumed noise and model error, and its expected value.
     evidence : float
-        Logarithm of the record's likelihood, states and parameters integrated out, but for a constant.
+        Log likelihood of the record, states and parameters integrated out, up to a constant.
     converged : bool
     measurements : tuple of Measurement
     record : Record
-        The frames as the estimator saw them.
+        The frames as the estimator used them.
     states : ndarray (n, d)
         The state at each frame of `record`.
     state_covariance : ndarray (n, d, d)
     misfit, misfit_variance : ndarray (n, m)
-        What was seen less what was fitted, NaN where nothing was seen, and the variance of what was fitted.
+        Observations minus fitted values, NaN if nothing was observed, and the variance of the fitted values.
     defect : ndarray (n - 1, d)
-        By how much each state misses what the model makes of the one before, per second: the residual of each
-        equation. NaN where frames are not linked.
+        Residual of each equation: the difference between each state and the model's prediction from the one
+        before, per second. NaN if frames are not linked.
     noise : Noise
         The measurement's noise as the record shows it.
     widened : float
-        By what `errors` were multiplied, and the covariance twice, for what the model may miss.
+        Factor by which `errors` were inflated for missing physics; the covariance by its square.
     unit_doubt : str or None
-        The unit that explains the record far better than the one stated, in a sentence.
+            Sentence about a unit that explains the record far better than the given one.
+
+    See Also
+    --------
+    udd.plot.residuals : draw the residuals of an equation over a coordinate.
+    udd.plot.misfit : draw observations minus fitted values over time.
+    udd.plot.residual_map : draw the residuals over two coordinates.
+    udd.plot.whiteness : draw the autocorrelation of the innovations.
     """
 
     models: tuple[Model, ...]
@@ -176,51 +183,51 @@ class Fit(Drawable):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What `misfit` is of: the measurement's columns, or all that a user's own model shows."""
+        """Channels of `misfit`: the measurement's columns, or all channels of a user's own model."""
         return self.model.channels if isinstance(self.model, FormulaModel) else self.measurement.names
 
     @property
     def blurring(self) -> Array:
-        """The angular speed that noise may grow with, rad/s; a user's state need not be one."""
+        """Angular speed that noise may grow with, rad/s; zero for a user's own model."""
         omega = self.states[:, 0]
         return np.zeros(len(omega)) if self.model.profile.written else omega
 
     @property
     def residuals(self) -> Array:
-        """What was seen less what was fitted, for every row of the measurement; NaN where not seen.
+        """Observations minus fitted values, for every row of the measurement; NaN if not observed.
 
-        Those of several measurements come one after the other.
+        Those of several measurements follow one after the other.
         """
         rows = [np.full((len(m), self.misfit.shape[1]), np.nan) for m in self.measurements]
-        for film, own in enumerate(rows):
+        for film, film_rows in enumerate(rows):
             there = (self.record.film == film) & (self.record.row >= 0)
-            own[self.record.row[there]] = self.misfit[there]
+            film_rows[self.record.row[there]] = self.misfit[there]
         return np.concatenate(rows)
 
     @property
     def observations(self) -> int:
-        """How many numbers were seen."""
+        """Count of observed numbers."""
         return int(np.isfinite(self.misfit).sum())
 
     @property
     def level(self) -> int:
-        """How tightly the model was held: the place of its assumed error in the schedule."""
+        """Index of the model error in the schedule: a higher level is a smaller error."""
         return self.problem.schedule.index(self.problem.diffusion)
 
     @property
     def scatter(self) -> float:
-        """chi2 per degree of freedom: 1 where model and noise explain the data."""
+        """chi2 per degree of freedom: 1 if model and noise explain the data."""
         return self.chi2 / (self.dof if self.dof > 0.0 else 1.0)
 
     @property
     def leverage(self) -> float:
-        """How closely the fit follows each frame: its variance in units of the noise's, in the mean."""
+        """Mean variance of the fitted values in units of the noise: how closely the fit follows frames."""
         sd = self.noise.sd(self.record, self.states[:, 0])
         return float((self.misfit_variance / sd**2)[self.record.observed].mean())
 
     @property
     def faults(self) -> float:
-        """How much of chi2 a film's faults that go with the motion may make up: 0 where noise hides them."""
+        """Share of chi2 that a film's faults can explain if they follow the motion: 0 if noise hides them."""
         sd = self.noise.sd(self.record, self.states[:, 0])
         fault = np.array(self.model.profile.sensor.faults)
         return float(np.square(fault / sd, where=self.record.observed, out=np.zeros(sd.shape)).sum())
@@ -228,22 +235,22 @@ class Fit(Drawable):
     put_away = renamed_attribute("put_away", "without_cache")
 
     def without_cache(self) -> Fit:
-        """The same without what its solve left for those who ask for more: a kilobyte and a half a frame."""
+        """Return the fit without its solve's linearisation, which takes about 1.5 kB a frame."""
         return replace(self, point=self.point.bare())
 
     def inflation(self, before: Fit) -> float:
-        """By what a fall of chi2 from another fit is divided before it counts.
+        """Return the factor by which a decrease of chi2 from another fit is divided.
 
-        The scatter that remains, times how much stronger the misfits are at the frequencies where the two
+        It is the remaining scatter times the misfits' excess power at the frequencies in which the two fits
         differ.
         """
         return max(self.scatter, 1.0) * self._colour(before)
 
     @cached_property
     def shown(self) -> float:
-        """The scatter, at least 1 where the noise was known; how forms are told apart.
+        """Scatter, at least 1 if the noise was known; used to distinguish forms.
 
-        A pendulum's film is not taken for better than its geometry, which many are.
+        A pendulum's film is not assumed to be more accurate than its geometry, as many are not.
         """
         assumed = geometry_limits(self.model.profile.sensor, self.measurement)
         return self.scatter if assumed else max(self.scatter, 1.0)
@@ -254,13 +261,13 @@ class Fit(Drawable):
 
     @cached_property
     def doubts(self) -> Diagnostics:
-        """What the fit shows of its own faults: whether something is missing, and what ran off."""
+        """Goodness of fit: remaining model error, whiteness, runaway parameters."""
         from .diagnostics import doubts
 
         return doubts(self)
 
     def doubted(self) -> Fit:
-        """The same with standard errors that contain what the model may miss, see :class:`Diagnostics`."""
+        """Return the fit with standard errors that include missing physics, see :class:`Diagnostics`."""
         factor = self.doubts.factor / self.widened
         if factor == 1.0:
             return self
@@ -273,13 +280,13 @@ class Fit(Drawable):
     @renamed(held="fixed")
     @checked_arguments(error=FitError)
     def budget(self, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
-        """Uncertainty budget (GUM) of the fitted numbers, see :mod:`udd.fitting.uncertainty_budget`."""
+        """Compute the GUM uncertainty budget of the parameters, see :mod:`udd.fitting.uncertainty_budget`."""
         from .uncertainty_budget import budget
 
         return budget(self, fixed, k)
 
     def summary(self) -> str:
-        """The fit on one screen: what it shows of its own faults, and every parameter with its unit."""
+        """Summarise the fit on one screen: its diagnostics, and every parameter with its unit."""
         return "\n".join([self._state, *self.doubts.sentences, *self._table()])
 
     @property
@@ -288,26 +295,26 @@ class Fit(Drawable):
         return f"{state}, chi2/dof = {self.scatter:.3f}, {len(self.record.t)} frames"
 
     def _table(self) -> list[str]:
-        """Every parameter on a line."""
+        """Format every parameter on a line."""
         from .diagnostics import units
         from .parameter_meanings import meaning
 
-        known = units(self)
+        all_units = units(self)
         return [
-            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {known[name]:<6} "
+            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {all_units[name]:<6} "
             f"{meaning(name, self.model.kind)}".rstrip()
             for name, value in self.parameters.items()
         ]
 
     def __repr__(self) -> str:
-        """One line; :meth:`summary` says more."""
+        """Describe the fit in one line; :meth:`summary` says more."""
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in list(self.parameters.items())[:4])
         more = ", ..." if len(self.parameters) > 4 else ""
         kinds = ", ".join(dict.fromkeys(type(model).__name__ for model in self.models))
         return f"<Fit of {kinds}: {self._state}; {numbers}{more}>"
 
     def _repr_html_(self) -> str:
-        """As :meth:`summary`, for notebooks."""
+        """Format :meth:`summary` for notebooks."""
         from html import escape
 
         first, *more = self.doubts.sentences
@@ -317,11 +324,11 @@ class Fit(Drawable):
         return f"{head}<ul>{items}</ul><pre>{table}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads: parameters with errors, noise, goodness, and what there is to doubt."""
+        """Return parameters with errors, noise, goodness of fit and diagnostics as JSON-ready values."""
         return self.numbers() | {"doubts": self.doubts.to_dict()}
 
     def numbers(self) -> dict[str, Any]:
-        """Parameters with errors, noise and goodness, as a machine reads them."""
+        """Return parameters with errors, noise and goodness of fit as JSON-ready values."""
         return {
             "model": repr(self.model),
             "parameters": {n: {"value": v, "se": self.errors[n]} for n, v in self.parameters.items()},

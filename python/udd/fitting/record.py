@@ -1,4 +1,4 @@
-"""A measurement as the estimator takes it: frames in a row, linked or not, and a guess of the states."""
+"""Measurements prepared for the estimator: consecutive frames, their links, and a guess of the states."""
 
 from __future__ import annotations
 
@@ -25,30 +25,28 @@ from .sensor import few_readings, frame_noise, is_encoder, lattice, moving, nois
 
 Array = NDArray[np.float64]
 
-#: A frame is odd that lies farther off than this times what is typical; honest noise does in 1 of 1e8.
+#: A frame is an outlier if its distance exceeds this times the typical one; normal noise does in 1 of 1e8.
 _ODD = 9.0
 _FEWEST = 10  # frames of a fit
-_FEWEST_OF_SEVERAL = 4  # frames of each of several records: with fewer its start takes up all of them
+_FEWEST_OF_SEVERAL = 4  # frames of each of several records: with fewer, its start states use up all of them
 _SHORT = 30  # frames, below which a record by itself hardly shows its noise
-_LEAP = 0.5  # of the steps before and after, which a bend of the motion does not reach
-_CLEANED = 8  # times odd frames are looked for: those that come close together spoil each other's look
+_LEAP = 0.5  # share of the steps before and after that a bend of the motion does not reach
+_CLEANED = 8  # rounds of outlier detection: outliers close to each other hide each other
 
 
 @dataclass(frozen=True, repr=False)
 class Record(OneLine):
-    """Frames for the estimator.
-
-    One measurement's, or those of several one after the other.
+    """Frames for the estimator, of one measurement or of several in sequence.
 
     Attributes
     ----------
     t : ndarray (n,)
-        Time of each frame since its measurement's first row, s. Frames that were missing in short gaps are
-        put in, so that no flow runs for long.
+        Time of each frame since its measurement's first row, s. Frames missing in short gaps are inserted, so
+        that no flow runs for long.
     seen : ndarray (n, m)
-        What was seen; 0 where it was not.
+        The observations; 0 if not observed.
     sigma : ndarray (n, m)
-        Standard deviation that the measurement states; infinite where a channel was not seen.
+        Standard deviation that the measurement states; infinite if a channel was not observed.
     rho : ndarray (n, m, m)
         Correlation of the channels' errors.
     linked : ndarray of bool (n - 1,)
@@ -56,14 +54,14 @@ class Record(OneLine):
     states : ndarray (n, d)
         A first guess of the states.
     odd : ndarray of bool (n,)
-        Frames that lie far from where their neighbours point; a fit starts without them.
+        Outliers, far from the curve through their neighbours; a fit starts without them.
     row : ndarray of int (n,)
-        The measurement's row that a frame came from; -1 where it was put in.
+        The measurement's row of a frame; -1 if it was inserted.
     film : ndarray of int (n,)
         The number of the measurement that a frame belongs to.
     origins : tuple of float
-        Each measurement's time of its first row, s, from which the model's time counts: a drift's drive and a
-        ripple's phase are those at the record's start.
+        Time of each measurement's first row, s, which is the zero of the model's time: a drift's drive and a
+        ripple's phase refer to the record's start.
     """
 
     t: Array
@@ -78,7 +76,7 @@ class Record(OneLine):
     origins: tuple[float, ...]
 
     def part(self, frames: slice | NDArray[Any]) -> Record:
-        """Frames by a slice, a mask or increasing numbers; only those that follow one another are linked."""
+        """Select frames by a slice, a mask or increasing numbers; only consecutive ones stay linked."""
         chosen = np.arange(len(self.t))[frames]
         follow = np.diff(chosen) == 1
         return replace(
@@ -96,7 +94,7 @@ class Record(OneLine):
 
     @property
     def origin(self) -> float:
-        """The first measurement's time of its first row, s."""
+        """Time of the first measurement's first row, s."""
         return self.origins[0]
 
     @property
@@ -106,21 +104,21 @@ class Record(OneLine):
         return result
 
     def first(self, share: float) -> NDArray[np.bool_]:
-        """Which frames belong to the first part of their measurement, by number."""
+        """Mark the frames in the first part of their measurement, by count."""
         result = np.zeros(len(self.t), dtype=bool)
         for film in range(len(self.origins)):
-            own = np.flatnonzero(self.film == film)
-            result[own[: int(share * len(own))]] = True
+            frames = np.flatnonzero(self.film == film)
+            result[frames[: int(share * len(frames))]] = True
         return result
 
     @cached_property
     def observed(self) -> NDArray[np.bool_]:
-        """Which channels were seen in which frame, (n, m)."""
+        """True for each channel that was observed in a frame, (n, m)."""
         return np.isfinite(self.sigma)
 
     @cached_property
     def unmixing(self) -> Array:
-        """The inverses of the channels' correlations, (n, m, m)."""
+        """Inverses of the channels' correlations, (n, m, m)."""
         inverse: Array = np.asarray(np.linalg.inv(self.rho), dtype=np.float64)
         return inverse
 
@@ -130,51 +128,60 @@ def record_of(
     model: Model | Sequence[Model] | None = None,
     state0: Mapping[str, float] | Sequence[Mapping[str, float]] | None = None,
 ) -> Record:
-    """Lay a measurement out for the estimator, or several one after the other.
+    """Prepare a measurement for the estimator, or several in sequence.
 
-    The channels are the measurement's columns; for a model of the user's own they are the model's sensors or
-    states, of which the measurement may see but some; `state0` holds starts of the others, for all
-    measurements or one table each.
+    The channels are the measurement's columns. For a user's own model they are the model's sensors or states,
+    of which the measurement may have only some; `state0` holds start values of the others, for all
+    measurements or in one table each.
 
     Raises
     ------
     FitError
-        Where it is no measurement, or too few frames were seen.
+        It is not a measurement, or has too few observed frames.
     """
     if not isinstance(measurement, Measurement):
         if isinstance(measurement, (list, tuple)) and len(measurement):
             models = model if isinstance(model, Sequence) else [model] * len(measurement)
             starts = state0 if isinstance(state0, Sequence) else [state0] * len(measurement)
             if len(starts) != len(measurement):
-                raise FitError(f"there are {len(measurement)} measurements but {len(starts)} starts")
+                raise FitError(
+                    f"got {len(measurement)} measurements but {len(starts)} starts; expected one each"
+                )
             if len(models) != len(measurement):
-                raise FitError(f"there are {len(measurement)} measurements but {len(models)} models")
+                raise FitError(
+                    f"got {len(measurement)} measurements but {len(models)} models; expected one, or one each"
+                )
             alone = len(measurement) == 1
-            records = [_record_of(*own, alone) for own in zip(measurement, models, starts, strict=True)]
+            records = [
+                _record_of(*arguments, alone) for arguments in zip(measurement, models, starts, strict=True)
+            ]
             return _joined(records if alone else _together(measurement, records))
-        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+        raise FitError(
+            f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r:.80}"
+        )
     if isinstance(model, Sequence):
         if len(model) != 1:
-            raise FitError(f"there is one measurement but {len(model)} models")
+            raise FitError(f"got one measurement but {len(model)} models; expected one model")
         (model,) = model
     return _record_of(measurement, model, state0, alone=True)
 
 
 def _together(measurements: Sequence[Measurement], records: Sequence[Record]) -> list[Record]:
-    """Records that are fitted together: what one alone must have all must have together.
+    """Check records that are fitted together, and let short ones share their noise.
 
-    Noise that is not stated is the same in all short records: a few frames show it to a factor.
+    Only together must they have enough frames and show motion. Noise that is not stated is assumed to be the
+    same in all short records, because a few frames show it only roughly.
     """
     count = sum(int(record.observed.any(axis=1).sum()) for record in records)
     if count < _FEWEST:
         raise FitError(f"the measurements hold {count} usable frames; a fit needs at least {_FEWEST}")
     if not any(_changes(record) for record in records):
         names = ", ".join(measurements[0].names)
-        raise FitError(f"{names}: nothing changes, and nothing can be learnt from that")
+        raise FitError(f"{names}: all values are constant, so nothing can be fitted")
     short = [
         k
-        for k, (own, record) in enumerate(zip(measurements, records, strict=True))
-        if own.sigma is None and len(record.t) < _SHORT
+        for k, (measurement, record) in enumerate(zip(measurements, records, strict=True))
+        if measurement.sigma is None and len(record.t) < _SHORT
     ]
     if len(short) < 2 or len({record.seen.shape[1] for record in records}) > 1:
         return list(records)
@@ -189,9 +196,9 @@ def _together(measurements: Sequence[Measurement], records: Sequence[Record]) ->
 
 
 def _median(record: Record, channel: int) -> float:
-    """The typical noise of a channel; 0 if it was not seen."""
-    own = record.sigma[record.observed[:, channel], channel]
-    return float(np.median(own)) if len(own) else 0.0
+    """Return the typical noise of a channel; 0 if it was not observed."""
+    noise = record.sigma[record.observed[:, channel], channel]
+    return float(np.median(noise)) if len(noise) else 0.0
 
 
 def _changes(record: Record) -> bool:
@@ -202,46 +209,46 @@ def _changes(record: Record) -> bool:
 
 
 def _record_of(measurement: Any, model: Any, state0: Any, alone: bool) -> Record:
-    """As :func:`record_of`, of one measurement, fitted alone or together with others."""
+    """Prepare one measurement as :func:`record_of` does, to be fitted alone or together with others."""
     if not isinstance(measurement, Measurement):
-        raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r}")
+        raise FitError(
+            f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r:.80}"
+        )
     fewest = _FEWEST if alone else _FEWEST_OF_SEVERAL
     measurement = unwrapped(measurement, angles_of(model))
-    own = model if isinstance(model, FormulaModel) else None
-    start = None if state0 is None else checked_start(own, state0)
-    if own and not set(measurement.names) <= set(own.channels):
-        given, wanted = ", ".join(measurement.names), ", ".join(own.channels)
-        what = "sensors" if own.observe else "states"
+    formula_model = model if isinstance(model, FormulaModel) else None
+    start = None if state0 is None else checked_start(formula_model, state0)
+    if formula_model and not set(measurement.names) <= set(formula_model.channels):
+        given, wanted = ", ".join(measurement.names), ", ".join(formula_model.channels)
+        what = "sensors" if formula_model.observe else "states"
         raise FitError(f"the measurement has columns {given}, but the model's {what} are {wanted}")
-    if not own and profile_of(measurement.kind).written:
+    if not formula_model and profile_of(measurement.kind).written:
         given = ", ".join(measurement.names)
         hint = ": a pendulum with a gyroscope is udd.Pendulum(...).with_gyroscope()"
         raise FitError(
             f"the measurement has columns {given}, which are neither a disk's nor a pendulum's"
             f"{hint if 'Omega' in measurement.names else ''}"
         )
-    if own and own.inputs:
-        (own,) = driven((own,), (measurement,))
+    if formula_model and formula_model.inputs:
+        (formula_model,) = driven((formula_model,), (measurement,))
     counts = np.isfinite(measurement.values).sum(axis=0)
-    if own and len(measurement.names) > 1 and counts.min() < fewest:
+    if formula_model and len(measurement.names) > 1 and counts.min() < fewest:
         name, count = measurement.names[int(np.argmin(counts))], int(counts.min())
-        raise FitError(f"{name} was seen in {count} rows; a column needs at least {fewest}: leave it out")
+        raise FitError(f"{name} was observed in {count} rows; a column needs at least {fewest}: leave it out")
     values, seen = measurement.values, measurement.seen & (np.arange(len(measurement)) < moving(measurement))
     if seen.sum() < fewest:
-        what = "a fit needs" if alone else "each of several that are fitted together needs"
+        what = "a fit needs" if alone else "in a joint fit each measurement needs"
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; {what} at least {fewest}")
     if alone and not (np.nanmax(values[seen], axis=0) > np.nanmin(values[seen], axis=0)).any():
-        raise FitError(
-            f"{', '.join(measurement.names)}: nothing changes, and nothing can be learnt from that"
-        )
+        raise FitError(f"{', '.join(measurement.names)}: all values are constant, so nothing can be fitted")
     origin = float(measurement.t[0])
     times = measurement.t[seen] - origin
     step = float(np.median(np.diff(times)))
-    longest = 3.5 * step if own else max(0.5, 3.5 * step)
+    longest = 3.5 * step if formula_model else max(0.5, 3.5 * step)
     t, row, linked = _fill(times, np.flatnonzero(seen), step, longest)
 
     columns = measurement.names
-    names = own.channels if own else columns
+    names = formula_model.channels if formula_model else columns
     places = np.array([names.index(name) for name in columns])
     there = np.flatnonzero(row >= 0)
     full = np.zeros((len(t), len(names)))
@@ -253,48 +260,48 @@ def _record_of(measurement: Any, model: Any, state0: Any, alone: bool) -> Record
     if measurement.sigma is None:
         sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, read), np.inf)
     else:
-        own_sigma = np.where(present, measurement.sigma[row[there]], np.inf)
-        for column, noise, read_there in zip(read.T, own_sigma.T, present.T, strict=True):
+        stated_sigma = np.where(present, measurement.sigma[row[there]], np.inf)
+        for column, noise, read_there in zip(read.T, stated_sigma.T, present.T, strict=True):
             noise[read_there] = stated_noise(column[read_there], noise[read_there])
-        sigma[np.ix_(there, places)] = own_sigma
+        sigma[np.ix_(there, places)] = stated_sigma
         if measurement.rho is not None:
             covariance, stated = measurement.covariance()[row[there]], measurement.sigma[row[there]]
-            both = present[:, :, None] & present[:, None, :]
+            observed_pairs = present[:, :, None] & present[:, None, :]
             correlation = covariance / (stated[:, :, None] * stated[:, None, :])
-            rho[np.ix_(there, places, places)] = np.where(both, correlation, np.eye(len(columns)))
+            rho[np.ix_(there, places, places)] = np.where(observed_pairs, correlation, np.eye(len(columns)))
     guess = np.column_stack([_joined_up(t, t[there], column) for column in read.T])
-    typical = np.array([np.median(one[np.isfinite(one)]) for one in sigma[:, places].T])
+    typical = np.array([np.median(column[np.isfinite(column)]) for column in sigma[:, places].T])
     odd = odd_frames(guess, typical, linked)
     for channel in guess.T:
         channel[odd] = _between(odd, channel)
     film = np.zeros(len(t), dtype=np.int64)
-    if own:
+    if formula_model:
         noise = dict(zip(columns, typical.tolist(), strict=True))
-        states = guessed(own, t, dict(zip(columns, guess.T, strict=True)), linked, start, noise)
+        states = guessed(formula_model, t, dict(zip(columns, guess.T, strict=True)), linked, start, noise)
     else:
         states = _states(t, guess, linked)
     return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
 
 
 def _joined_up(t: Array, there: Array, column: Array) -> Array:
-    """A column between the rows that have it: by straight lines over rows that lack all, else by a curve."""
+    """Interpolate a column: linearly over rows that lack all columns, else by Akima interpolation."""
     present = np.isfinite(column)
     if present.all():
         result: Array = np.interp(t, there, column)
         return result
-    return _bent(t, there[present], column[present])
+    return _akima(t, there[present], column[present])
 
 
-def _bent(at: Array, there: Array, column: Array) -> Array:
-    """Akima interpolation, which follows a motion's bends; beyond the ends what is there."""
+def _akima(at: Array, there: Array, column: Array) -> Array:
+    """Interpolate by Akima's method, which follows a motion's curvature; constant beyond the ends."""
     result: Array = Akima1DInterpolator(there, column)(np.clip(at, there[0], there[-1]))
     return result
 
 
 def _noise_of(measurement: Measurement, values: Array) -> Array:
-    """What is taken for the noise where a measurement does not say, of each column or of each frame too.
+    """Return the assumed noise if a measurement does not state it, of each column or of each frame.
 
-    Of a user's own model columns may have gaps: sensors have rates of their own.
+    With a user's own model columns may have gaps, because sensors have different rates.
     """
     if profile_of(measurement.kind).written:
         columns = [column[np.isfinite(column)] for column in values.T]
@@ -302,8 +309,8 @@ def _noise_of(measurement: Measurement, values: Array) -> Array:
         if not any(lattice(column) for column in columns):
             return _growing(values, typical)
         steps = np.full(values.shape, np.inf)
-        for own, column in zip(steps.T, values.T, strict=True):
-            own[np.isfinite(column)] = frame_noise(column[np.isfinite(column)])
+        for step_noise, column in zip(steps.T, values.T, strict=True):
+            step_noise[np.isfinite(column)] = frame_noise(column[np.isfinite(column)])
         result: Array = np.maximum(typical, steps)
         return result
     if profile_of(measurement.kind).sensor.zero is not None and is_encoder(measurement):
@@ -313,19 +320,19 @@ def _noise_of(measurement: Measurement, values: Array) -> Array:
 
 
 def _growing(values: Array, typical: Array) -> Array:
-    """The typical noise of each column, or of each frame where a column's grows with what was read."""
+    """Return the typical noise of each column, or of each frame if one grows with the reading."""
     least = 1e-6 * np.array([np.ptp(column[np.isfinite(column)]) for column in values.T])
     result = np.tile(typical, (len(values), 1))
-    for own, column, smallest in zip(result.T, values.T, least, strict=True):
+    for noise, column, smallest in zip(result.T, values.T, least, strict=True):
         present = np.isfinite(column)
-        own[present] = np.maximum(noise_by_size(column[present]), smallest)
+        noise[present] = np.maximum(noise_by_size(column[present]), smallest)
     return result if (np.ptp(result, axis=0) > 0.0).any() else typical
 
 
 def _joined(records: Sequence[Record]) -> Record:
-    """Records one after the other; the last frame of one is not linked with the first of the next."""
+    """Concatenate records; the last frame of one is not linked with the first of the next."""
     if len({record.seen.shape[1] for record in records}) > 1:
-        raise FitError("measurements that are fitted together must see the same kind of body")
+        raise FitError("measurements in a joint fit must be of the same kind of body; fit them separately")
     links = [np.append(record.linked, False) for record in records]
     return Record(
         t=np.concatenate([r.t for r in records]),
@@ -344,11 +351,11 @@ def _joined(records: Sequence[Record]) -> Record:
 def _fill(
     t: Array, rows: NDArray[np.int64], step: float, longest: float
 ) -> tuple[Array, NDArray[np.int64], NDArray[np.bool_]]:
-    """Put frames into short gaps; cut at long ones."""
+    """Insert frames into short gaps; cut at long ones."""
     gap = np.diff(t)
     steps = np.maximum(np.where(gap > longest, 1.0, np.rint(gap / step)), 1.0).astype(np.int64)
     before = np.repeat(np.arange(len(gap)), steps)
-    # Which of the steps over its gap a frame ends; the last ends at the next frame that is there.
+    # Index of the step over its gap that a frame ends; the last step ends at the next existing frame.
     number = np.arange(len(before)) - np.repeat(np.cumsum(steps) - steps, steps) + 1
     last = number == steps[before]
     times = np.where(last, t[before + 1], number * (gap / steps)[before] + t[before])
@@ -357,7 +364,7 @@ def _fill(
 
 
 def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Frames far from the cubic through the two before and the two after, in any channel (noise `sigma`)."""
+    """Detect frames far from the cubic through the two before and after, in any channel (noise `sigma`)."""
     n = len(guess)
     odd = np.zeros(n, dtype=bool)
     inside = np.zeros(n, dtype=bool)
@@ -370,30 +377,31 @@ def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray
         cubic = (4 * (filled[1:-3] + filled[3:-1]) - filled[:-4] - filled[4:]) / 6
         off[2:-2] = np.abs(filled[2:-2] - cubic)
         typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
-        # A film may be so precise that the motion's own bends stand out: they are small beside its steps.
+        # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
+        # steps.
         step = np.abs(np.diff(filled, axis=0))
         off[2:-2][off[2:-2] < _LEAP * np.maximum(step[:-3], step[3:])] = 0.0
         off[~inside | odd] = 0.0
-        # Of frames whose neighbours are odd too only the worst goes: it spoils the others' look.
+        # Of adjacent outliers only the worst is removed in a round: it distorts the cubics of the others.
         far = (off / typical).max(axis=1)
-        found = (far > _ODD) & (far >= maximum_filter1d(far, 5))
-        if not found.any():
+        is_odd = (far > _ODD) & (far >= maximum_filter1d(far, 5))
+        if not is_odd.any():
             break
-        odd |= found
+        odd |= is_odd
         for channel in filled.T:
             channel[odd] = _between(odd, channel)
     return odd
 
 
 def _between(odd: NDArray[np.bool_], x: Array) -> Array:
-    """What the other frames make of the odd ones."""
+    """Interpolate the outliers from the other frames."""
     number = np.arange(len(x), dtype=np.float64)
-    return _bent(number[odd], number[~odd], x[~odd])
+    return _akima(number[odd], number[~odd], x[~odd])
 
 
 def _states(t: Array, guess: Array, linked: NDArray[np.bool_]) -> Array:
-    """First guess of the states: the rate of the angle from neighbouring frames, the rest as seen.
+    """Guess the states: the rate of the angle from neighbouring frames, the rest as observed.
 
-    It only starts the estimator, which never differentiates data.
+    It is only the estimator's start; the estimator never differentiates data.
     """
     return np.column_stack([slope(t, guess[:, -1], linked), guess])

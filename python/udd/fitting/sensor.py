@@ -1,4 +1,4 @@
-"""What a record shows of its sensor: the steps that it reads in, and its noise."""
+"""Sensor properties that a record shows: steps of the readings, and noise."""
 
 from __future__ import annotations
 
@@ -15,28 +15,31 @@ from udd.models.profile import SensorProfile
 
 Array = NDArray[np.float64]
 
-_FEW = 8  # gaps between values that tell a lattice
-_SAME = 1e-7  # of the range, below which two values are one
-_OFF, _MOST = 0.02, 0.98  # how far gaps may be from multiples of the step, and how many are not farther
-_ORDERS = (3, 4, 5, 6)  # of the differences that tell noise from motion
-_MOVES = 3.0  # standard errors by which a frame differs from the one before where a film is not at rest
-_STILL = 10  # frames of a film that shows no motion any more, at least
+_FEW = 8  # gaps between values that are needed to detect a lattice
+_SAME = 1e-7  # share of the range below which two values are equal
+# tolerance of gaps relative to the step, and the share of gaps that must be within it
+_OFF, _MOST = 0.02, 0.98
+_ORDERS = (3, 4, 5, 6)  # of the differences that distinguish noise from motion
+_MOVES = 3.0  # standard errors by which a frame differs from the one before, unless a film is at rest
+_STILL = 10  # minimum of frames at rest at the end of a film
 _ROUND = (1.0, 2.0, 5.0, 10.0)
-_CLOSE = 1e-3  # relative, within which a number is a round one
-_WHITE = -0.8  # of neighbours' correlation in differences of noise from which on they are taken for noise
-_GROWS = 30.0  # nats that noise growing with what was read has to gain: differences go together
-_ABOVE = 10.0  # times the noise's variance that the mean square of readings is, for their size to be known
+_CLOSE = 1e-3  # relative tolerance of a round number
+# correlation of neighbours in differences of noise, relative to white noise, above which they count as noise
+_WHITE = -0.8
+_GROWS = 30.0  # nats that noise growing with the reading has to gain: differences are correlated
+# minimum ratio of the readings' mean square to the noise's variance, for their size to be reliable
+_ABOVE = 10.0
 _TURNS = 5
-_NEAR = 5  # frames whose mean square is a frame's size
+_NEAR = 5  # frames over which a frame's size is averaged
 
 
 def lattice(values: Array) -> float:
-    """The step in which a sensor reads, from the gaps between its values; 0 where they lie on no lattice.
+    """Return the step of a sensor's readings, from the gaps between its values; 0 if they lie on no lattice.
 
     Parameters
     ----------
     values : ndarray (n,)
-        In any order; NaN where nothing was read.
+        In any order; NaN if nothing was read.
 
     Examples
     --------
@@ -59,10 +62,10 @@ def lattice(values: Array) -> float:
 
 
 def roughness(values: Array) -> Array:
-    """The noise of evenly spaced columns (n, c), from the least of what differences of several orders show.
+    """Estimate the noise of evenly spaced columns (n, c) from differences of several orders.
 
-    Those of a smooth motion are the smaller the higher their order, those of noise are as many times its
-    variance as the middle binomial coefficient says.
+    The least of the estimates counts. Differences of a smooth motion decrease with their order; those of
+    noise have its variance times the central binomial coefficient.
     """
     shown = []
     for order in _ORDERS[: max(len(values) - _ORDERS[0], 1)]:
@@ -73,55 +76,55 @@ def roughness(values: Array) -> Array:
 
 
 def reads(values: Array) -> tuple[float, float]:
-    """``(noise, step)`` of one channel (n,): the step's own noise, step/sqrt(12), is contained.
+    """Estimate ``(noise, step)`` of one channel (n,); the noise contains the step's, step/sqrt(12).
 
-    A sensor that reads in steps coarser than its noise mostly repeats itself: there the step's is all.
+    A sensor with steps larger than its noise mostly repeats its readings: the noise is then that of the step.
     """
     step = lattice(values)
     return max(float(roughness(values[:, None])[0]), step / math.sqrt(12.0)), step
 
 
 def frame_noise(values: Array) -> Array:
-    """The noise of each frame of one channel, (n,), of which the steps' errors repeat where readings do."""
+    """Estimate the noise of each frame of one channel, (n,); the steps' errors repeat as the readings do."""
     noise, step = reads(values)
     return _shared(values, np.full(len(values), noise), step)
 
 
 def stated_noise(values: Array, sigma: Array) -> Array:
-    """As :func:`frame_noise`, where the noise `sigma` of each frame, (n,), is stated."""
+    """Compute :func:`frame_noise` from the stated noise `sigma` of each frame, (n,)."""
     return _shared(values, sigma, lattice(values))
 
 
 def few_readings(values: Array) -> Array:
-    """As :func:`frame_noise`, of an encoder that was seen in so few steps that they show no lattice."""
+    """Compute :func:`frame_noise` of an encoder with too few distinct readings to show a lattice."""
     step = float(np.diff(np.unique(values)).min())
     return _shared(values, np.full(len(values), step / math.sqrt(12.0)), step)
 
 
 def repeats(values: Array, step: float) -> NDArray[np.int64]:
-    """How often in a row each value was read, (n,)."""
+    """Return the length of the run of equal readings that each frame belongs to, (n,)."""
     changes = np.flatnonzero(np.abs(np.diff(values)) > step / 2) + 1
     lengths = np.diff(np.concatenate([[0], changes, [len(values)]]))
     return np.repeat(lengths, lengths)
 
 
 def _shared(values: Array, noise: Array, step: float) -> Array:
-    """The noise of each frame, larger where readings repeat.
+    """Increase the noise of frames with repeated readings.
 
-    As long as a motion stays within a step its frames share one error: together they tell what one would.
+    While a motion stays within a step its frames share one error: together they have the information of one.
     """
     if not step:
         return noise
-    own = np.minimum(step**2 / 12.0, noise**2)
-    result: Array = np.sqrt(noise**2 + (repeats(values, step) - 1) * own)
+    step_variance = np.minimum(step**2 / 12.0, noise**2)
+    result: Array = np.sqrt(noise**2 + (repeats(values, step) - 1) * step_variance)
     return result
 
 
 def noise_by_size(values: Array) -> Array:
-    """The noise of each frame of one channel (n,), which may grow with the size of what was read.
+    """Estimate the noise of each frame of one channel (n,), which may grow with the size of the reading.
 
-    Variance a + b x^2 of differences, of the lowest order that shows noise alone, fitted by their likelihood;
-    one for all frames where that is not much likelier, or where every order shows motion.
+    The variance a + b x^2 is fitted to differences, of the lowest order that shows noise alone, by maximum
+    likelihood. All frames get the same noise if that gains little likelihood, or if every order shows motion.
 
     Examples
     --------
@@ -147,29 +150,29 @@ def noise_by_size(values: Array) -> Array:
         return same
     if float((values**2).mean()) < _ABOVE * mean:
         return same
-    own = np.convolve(values**2, weights, "valid")
+    local_power = np.convolve(values**2, weights, "valid")
     size = uniform_filter1d(values**2, _NEAR, mode="nearest")
     variance = np.full(len(shown), mean)
     for _ in range(_TURNS):  # the scatter of a squared difference grows with its own expectation
-        terms = np.column_stack([np.ones(len(own)), own]) / variance[:, None]
+        terms = np.column_stack([np.ones(len(local_power)), local_power]) / variance[:, None]
         scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
         (a, b), _residual = nnls(terms / scale, shown / variance)
         a, b = max(a / scale[0], 1e-6 * mean), b / scale[1]
-        variance = a + b * own
+        variance = a + b * local_power
     gain = 0.5 * float((np.log(mean / variance) + shown / mean - shown / variance).sum())
     return np.sqrt(a + b * size) if b > 0.0 and gain > _GROWS else same
 
 
 def is_film(measurement: Measurement) -> bool:
-    """Whether a measurement is one of the disk, tracked in a film."""
+    """Return True if a measurement is one of the disk, tracked in a film."""
     return profile_of(measurement.kind).sensor.sees_marks and "px_per_m" in measurement.meta
 
 
 def moving(measurement: Measurement) -> int:
-    """The number of rows until a film's disk has come to rest for good, or all of them.
+    """Return the number of rows until a film's disk stops for good, or all of them.
 
-    From there on a compressed film repeats its picture, with its errors: the frames say nothing new, and
-    their scatter says nothing of the noise.
+    A compressed film then repeats its picture, with its errors: the frames have no new information, and their
+    scatter does not show the noise.
     """
     n = len(measurement)
     if not is_film(measurement) or measurement.sigma is None:
@@ -181,10 +184,10 @@ def moving(measurement: Measurement) -> int:
 
 
 def is_encoder(measurement: Measurement) -> bool:
-    """Whether a pendulum's angle was read by an encoder.
+    """Return True if an encoder read a pendulum's angle.
 
-    It says so, or it comes in steps that drown all other noise. Not where the steps are round numbers of rad
-    or degrees: those come from writing the table.
+    The measurement says so, or the angle comes in steps larger than all other noise. Steps that are round
+    numbers of rad or degrees come from writing the table, and do not count.
     """
     if measurement.meta.get("sensor") == "encoder":
         return True
@@ -195,11 +198,11 @@ def is_encoder(measurement: Measurement) -> bool:
 
 
 def geometry_limits(sensor: SensorProfile, measurement: Measurement) -> bool:
-    """Whether frames are counted on for no more than a film's geometry, as nothing else is known of them."""
+    """Return True if the frames are trusted only to a film's geometric error, because no noise is stated."""
     return sensor.faithful > 0 and measurement.sigma is None and not is_encoder(measurement)
 
 
 def _is_round(value: float) -> bool:
-    """Whether a number is 1, 2 or 5 times a power of ten."""
+    """Return True if a number is 1, 2 or 5 times a power of ten."""
     mantissa = value / 10.0 ** math.floor(math.log10(value))
-    return any(abs(mantissa / one - 1.0) < _CLOSE for one in _ROUND)
+    return any(abs(mantissa / round_number - 1.0) < _CLOSE for round_number in _ROUND)

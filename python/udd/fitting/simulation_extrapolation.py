@@ -1,4 +1,4 @@
-"""Simulation extrapolation: what the inputs' noise does to a fit's numbers (errors in variables)."""
+"""Bias of a fit by its inputs' noise, by simulation extrapolation (errors in variables)."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ __all__ = ["InputBias", "input_bias"]
 
 Array = NDArray[np.float64]
 
-#: Noise is added as much as is there and twice as much; a parabola through what comes out goes back to none.
+#: Added noise relative to the existing one, in variance. A parabola through the results extrapolates to none.
 _TIMES, _BACK = (1.0, 2.0), (3.0, -3.0, 1.0)
-_FEWEST = 2  # of the draws, that must end
+_FEWEST = 2  # of the draws, that must converge
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,11 +36,15 @@ class InputBias(Drawable, OneLine):
     Attributes
     ----------
     bias : dict of str to float
-        By how much each parameter comes out too large.
+        Bias of each parameter: how much too large it is.
     errors : dict of str to float
-        Standard errors of these, from the draws.
+        Standard errors of the biases, from the draws.
     corrected : dict of str to float
-        The parameters less their bias.
+            The parameters minus their bias.
+
+    See Also
+    --------
+    udd.plot.bias : draw it.
     """
 
     bias: dict[str, float]
@@ -50,28 +54,34 @@ class InputBias(Drawable, OneLine):
 
 @checked_arguments(error=FitError)
 def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None = 0) -> InputBias:
-    """Simulation extrapolation (SIMEX): what the inputs' noise does to the fitted numbers.
+    """Estimate the bias of the fitted numbers by the inputs' noise, by simulation extrapolation (SIMEX).
 
-    The fit is made again with noise added to every input, once and twice as much in variance as its samples
-    show. A parabola through the three results goes back to an input without noise.
+    The fit is repeated with noise added to every input, once and twice the variance that its samples show. A
+    parabola through the three results extrapolates to an input without noise.
 
     Parameters
     ----------
     fit : Fit
-        Of a model with inputs.
+        Fit of a model with inputs.
     draws : int
-        Of the noise that is added, for each size.
+        Draws of the added noise, for each size.
     rng : int or Generator, optional
         Seed or generator of the draws.
 
     Returns
     -------
     InputBias
+        `bias`, its `errors`, and the `corrected` parameters.
 
     Raises
     ------
     FitError
-        A model without inputs, or fits with added noise that do not end.
+            The model has no inputs, or fits with added noise do not converge.
+
+    See Also
+    --------
+    udd.fit : make the fit.
+    udd.plot.bias : draw the result.
 
     References
     ----------
@@ -92,26 +102,26 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
     (['g'], True)
     """
     if not fit.model.inputs:
-        raise FitError("the model has no inputs whose noise could bias it")
+        raise FitError("the model has no inputs, so there is no bias by their noise")
     draws, random = whole("draws", draws, _FEWEST), generator(rng)
     names = list(dict.fromkeys(free.name.partition("[")[0] for free in fit.problem.free))
     priors = {free.name: (free.mean, free.sd) for free in fit.problem.free if np.isfinite(free.sd)}
     each = list(dict.fromkeys(f.name.partition("[")[0] for f in fit.problem.free if f.film is not None))
     firsts = [int(np.argmax(fit.record.film == film)) for film in range(len(fit.measurements))]
     starts = [dict(zip(fit.model.state_names, fit.states[k].tolist(), strict=True)) for k in firsts]
-    found: list[list[list[float]]] = [[] for _ in _TIMES]
+    draws_by_size: list[list[list[float]]] = [[] for _ in _TIMES]
     for k in range(draws * len(_TIMES)):
-        noised = [_noised(one, _TIMES[k % len(_TIMES)], random) for one in fit.measurements]
+        noised = [_noised(measurement, _TIMES[k % len(_TIMES)], random) for measurement in fit.measurements]
         try:
             again = fit_again(noised, list(fit.models), names, priors=priors, each=each, state0=starts)
         except SolveError:
             continue
-        found[k % len(_TIMES)].append([again.parameters[name] for name in fit.parameters])
-    if any(len(own) < _FEWEST for own in found):
-        raise FitError("fits with as much noise again on the inputs do not end: the inputs are too noisy")
+        draws_by_size[k % len(_TIMES)].append([again.parameters[name] for name in fit.parameters])
+    if any(len(values) < _FEWEST for values in draws_by_size):
+        raise FitError("fits with added noise on the inputs do not converge: the inputs are too noisy")
     now = np.array(list(fit.parameters.values()))
-    means = [now, *(np.mean(own, axis=0) for own in found)]
-    variances = [np.var(own, axis=0, ddof=1) / len(own) for own in found]
+    means = [now, *(np.mean(values, axis=0) for values in draws_by_size)]
+    variances = [np.var(values, axis=0, ddof=1) / len(values) for values in draws_by_size]
     corrected = np.array(_BACK) @ np.array(means)
     errors = np.sqrt(np.square(_BACK[1:]) @ np.array(variances))
 
@@ -122,7 +132,7 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
 
 
 def _noised(measurement: Measurement, times: float, rng: np.random.Generator) -> Measurement:
-    """A measurement with noise added to its inputs, so many times as much in variance as they have."""
+    """Add noise to a measurement's inputs, in variance `times` what they have."""
     signals = {}
     for name, signal in measurement.inputs.items():
         more = np.sqrt(times) * noise_of(signal) * rng.normal(size=len(signal))

@@ -21,14 +21,15 @@ from .record import Record
 
 Array = NDArray[np.float64]
 
-#: Steps of a fit by itself.
+#: Maximum of steps of a single fit.
 MOST = 40
-#: A step that promises to lower chi2 by less is the last: it moves nothing by a tenth of a standard error.
+#: A step that promises a smaller decrease of chi2 is the last: it changes no parameter by 0.1 standard
+#: errors.
 DONE = 0.01
 
 
 class SolveError(FitError):
-    """A fit that could not be solved, as against one that was not put right.
+    """A fit that could not be solved, unlike one that was set up wrongly.
 
     Attributes
     ----------
@@ -48,10 +49,10 @@ def solve(
 ) -> Fit:
     """Minimise once, for the problem's assumed model error, from a point.
 
-    Done when a step promises to lower chi2 by less than `decrease`.
+    It stops when a step promises to decrease chi2 by less than `decrease`.
     """
     try:
-        found = _core.solve(problem.at(point), iterations, decrease)
+        result = _core.solve(problem.at(point), iterations, decrease)
     except ValueError as error:
         unsolved = SolveError(_said(error, problem))
         if len(error.args) == 2:
@@ -59,39 +60,39 @@ def solve(
         raise unsolved from error
     record = problem.record
     names = [f.name for f in problem.free]
-    sets = tuple(FilmParameters(*own) for own in found["sets"])
-    end = Point(found["states"], sets, found["linear"])
+    sets = tuple(FilmParameters(*film_parameters) for film_parameters in result["sets"])
+    end = Point(result["states"], sets, result["linear"])
     try:
         models = tuple(
             model.with_parameters(dict(zip(model.parameters, values, strict=True)))
             for model, (values, _camera, _clock) in zip(problem.models, end.sets, strict=True)
         )
     except ModelError as error:  # a shape left its range
-        raise SolveError(f"the fit went where the model has no meaning: {error}") from error
+        raise SolveError(f"the fit reached parameters that are invalid for the model: {error}") from error
     seen = record.observed
-    # Every state but a run's first is tied to the one before: what remains are the frames' misfits.
+    # Every state except a run's first is tied to the one before: the frames' misfits remain.
     runs = 1 + int((~record.linked).sum())
     proper = sum(np.isfinite(f.sd) for f in problem.free)
-    dof = float(seen.sum()) + proper - len(problem.free) - runs * found["states"].shape[1]
+    dof = float(seen.sum()) + proper - len(problem.free) - runs * result["states"].shape[1]
     linked = record.linked[:, None]
     dt = np.where(linked, np.diff(record.t)[:, None], 1.0)
     return Fit(
         models=models,
         parameters={f.name: end.value(f) for f in problem.free},
-        errors=dict(zip(names, np.sqrt(np.diag(found["covariance"])).tolist(), strict=True)),
-        covariance=found["covariance"],
-        chi2=float(sum(found["cost"])),
+        errors=dict(zip(names, np.sqrt(np.diag(result["covariance"])).tolist(), strict=True)),
+        covariance=result["covariance"],
+        chi2=float(sum(result["cost"])),
         dof=dof,
-        evidence=found["evidence"],
-        converged=found["converged"],
-        iterations=found["iterations"],
+        evidence=result["evidence"],
+        converged=result["converged"],
+        iterations=result["iterations"],
         measurements=measurements,
         record=record,
-        states=found["states"],
-        state_covariance=found["state_covariance"],
-        misfit=np.where(seen, found["misfit"], np.nan),
-        misfit_variance=found["seen_variance"],
-        defect=np.where(linked, found["defect"] / dt, np.nan),
+        states=result["states"],
+        state_covariance=result["state_covariance"],
+        misfit=np.where(seen, result["misfit"], np.nan),
+        misfit_variance=result["seen_variance"],
+        defect=np.where(linked, result["defect"] / dt, np.nan),
         noise=problem.noise,
         problem=problem,
         point=end,
@@ -99,24 +100,24 @@ def solve(
 
 
 def _said(error: ValueError, problem: Problem) -> str:
-    """What went wrong; parameters that can change together by their names."""
+    """Explain an error of the core; name parameters that can change together."""
     if len(error.args) == 2:
         together = [problem.free[k].name for k in error.args[1]]
         return (
             f"the data do not determine the free parameters: {' and '.join(together)} can change "
-            "together without changing the fit; give one of them a prior, or hold it"
+            "together without changing the fit; give one of them a prior, or fix it"
             if len(together) > 1
-            else f"the data say nothing of {together[0]}; give it a prior, or hold it"
+            else f"the data do not depend on {together[0]}; give it a prior, or fix it"
         )
     model = problem.models[0]
     if "do not determine the state" in str(error) and isinstance(model, FormulaModel):
         noise = state_noise(model, problem.record.t, problem.record.states, problem.record.sigma)
-        hidden = [name for name, own in zip(model.state_names, noise, strict=True) if not np.isfinite(own)]
+        hidden = [name for name, sd in zip(model.state_names, noise, strict=True) if not np.isfinite(sd)]
         asked = ", ".join(f"'{name}': ..." for name in hidden)
         if hidden:
             is_not = "is" if len(hidden) == 1 else "are"
             return (
-                f"the fit failed: {error}; {', '.join(hidden)} {is_not} not seen: "
+                f"the fit failed: {error}; {', '.join(hidden)} {is_not} not observed: "
                 f"say where the motion starts, state0={{{asked}}}"
             )
     return f"the fit failed: {error}"
@@ -130,23 +131,23 @@ def predicted(
     states: Array,
     times: Array,
 ) -> Array:
-    """What would be seen at times (k, h), increasing, after starts (k,), by the models alone.
+    """Predict the observations at times (k, h), increasing, after starts (k,), by the models alone.
 
     Parameters
     ----------
     models : sequence of Model
-        One per film, alike but for their parameters' values, for which `sets` count.
+        One per film, with the same parameters; their values are those of `sets`.
     sets : sequence of FilmParameters
         As a fit's ``point.sets``.
     film : ndarray of int (k,)
-        Of each start.
+        Film of each start.
     t0, states : ndarray (k,), (k, d)
     times : ndarray (k, h)
 
     Returns
     -------
     ndarray (k, h, m)
-        NaN from where a run ends because the model's solution blows up.
+        NaN after the point at which the model's solution diverges.
     """
     try:
         return _core.predict(models[0], sets, film.tolist(), t0, states, times)
@@ -166,9 +167,9 @@ def _as_far_as_it_runs(
     states: Array,
     times: Array,
 ) -> Array:
-    """One run that does not reach its last time, by bisection for the last that it does."""
+    """Predict one run that does not reach its last time, with bisection for the last time that it reaches."""
     reached, beyond = 0, times.shape[1]
-    # What is seen at the start itself takes no run: it says how many columns there are.
+    # The observation at the start itself takes no run and gives the number of columns.
     result = np.repeat(_core.predict(models[0], sets, film.tolist(), t0, states, t0[:, None]), beyond, axis=1)
     while beyond - reached > 1:
         half = (reached + beyond) // 2
@@ -184,9 +185,9 @@ def _as_far_as_it_runs(
 def filtered(
     fitted: Fit, record: Record, windows: NDArray[np.int64], diffusion: Sequence[float]
 ) -> tuple[Array, Array, Array]:
-    """From windows of frames alone: the states at the first and the last frame, the latter's covariance.
+    """Filter windows of frames: states at the first and the last frame, covariance of the last.
 
-    All parameters are a fit's.
+    All parameters are those of a fit.
     """
     seen = Observations.of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
     fixed = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
@@ -194,7 +195,7 @@ def filtered(
 
 
 def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:
-    """The same model fitted to some of the frames (a mask), held as tightly, from where the fit ended."""
+    """Fit the same model to some of the frames (a mask), with the same model error, from the fit's end."""
     noise = replace(fitted.noise, weight=fitted.noise.weight[frames])
     problem = replace(fitted.problem, record=fitted.record.part(frames), noise=noise)
     start = Point(fitted.states[frames], fitted.point.sets)
@@ -202,24 +203,24 @@ def within(fitted: Fit, frames: NDArray[np.bool_]) -> Fit:
 
 
 def done(fitted: Fit) -> float:
-    """As `DONE`, where chi2 per degree of freedom, by which standard errors are told, is that of a fit."""
+    """Return `DONE` scaled by a fit's chi2 per degree of freedom, which scales its standard errors."""
     return DONE * max(1.0, fitted.scatter)
 
 
 def frame_costs(fitted: Fit) -> Array:
-    """Cost of every frame of a fit.
+    """Compute the cost of every frame of a fit.
 
     Returns
     -------
     cost : ndarray (n,)
-        Squared misfit of a frame in units of the noise, with the squared defect of the link that leaves it in
-        units of the model's assumed error.
+        Squared misfit of a frame in units of the noise, plus the squared defect of the link after it in units
+        of the assumed model error.
     """
     record, problem = fitted.record, fitted.problem
     information = problem.noise.information(record, fitted.states[:, 0])
     misfit = np.nan_to_num(fitted.misfit)
     cost: Array = np.einsum("ni,nij,nj->n", misfit, information, misfit)
-    # A defect is kept per second; its variance over a link of length dt is diffusion^2 dt.
+    # Defects are per second; the variance over a link of length dt is diffusion^2 dt.
     dt = np.abs(np.diff(record.t))[:, None]
     links = np.nan_to_num(fitted.defect) ** 2 * dt / np.array(problem.diffusion) ** 2
     cost[:-1] += links.sum(axis=1)

@@ -1,4 +1,4 @@
-"""Block averages (decimation) of a record sampled more often than motion and noise need."""
+"""Block averages (decimation) of a record sampled faster than motion and noise require."""
 
 from __future__ import annotations
 
@@ -19,35 +19,36 @@ from .sensor import is_encoder, lattice
 
 Array = NDArray[np.float64]
 
-#: Frames above which a record is thinned: about half as many are left then.
+#: Frames above which a record is thinned, to about half of them.
 MANY = 8000
-#: The same where inputs were measured: a run over their samples takes a step for each.
+#: The same if inputs were measured: a run takes a step for each of their samples.
 MANY_DRIVEN = 2000
-#: Blocks in the time in which the motion changes (its spread over its fast rates), at least.
+#: Minimum of blocks in the time in which the motion changes (its spread over its fast rates).
 _BLOCKS = 2
-_SHORTER = 0.8  # times the block, tried next where the motion bends too much within it
-_FAST = 0.9  # quantile of the rates: of frames one in fifty may be odd
-_STRETCHES = 20  # of a record that is mostly at rest, each of which may show the motion
-_WHOLE = 0.9  # of the frames seen, of which every column must be
-_BIAS = 0.3  # of a mean's noise that the bends of the motion within a block may move it by
-_FULL = 0.8  # of a block's frames, from which on its mean is corrected; below half of them there is none
+_SHORTER = 0.8  # factor to the next shorter block if the motion has too much curvature within one
+_FAST = 0.9  # quantile of the rates: one in fifty frames may be an outlier
+_STRETCHES = 20  # parts of a record that is mostly at rest, of which any may show the motion
+_WHOLE = 0.9  # share of the observed frames in which all columns must be present
+_BIAS = 0.3  # share of a mean's noise that the curvature of the motion within a block may contribute
+# share of a block's frames from which on its mean is corrected; below half of them there is no mean
+_FULL = 0.8
 _NEXT = 1.5  # steps within which a frame follows another
-_PARTS = 4  # of a block, whose means show the noise
+_PARTS = 4  # parts of a block; their means show the noise
 
 
 @dataclass(frozen=True)
 class Thinned:
-    """A measurement, block by block.
+    """Result of :func:`thinned`: block means of a measurement.
 
     Attributes
     ----------
     measurement : Measurement
     every : int
-        How many frames each block holds; 1 where the record is as it was.
+        Frames in each block; 1 if the record is unchanged.
     frames : int
-        How many there were.
+        Frames before thinning.
     steps : dict of str to float
-        The step that each column was read in, which its means no longer show; 0 where there is none.
+        Step in which each column was read, which its means no longer show; 0 if there is none.
     """
 
     measurement: Measurement
@@ -57,11 +58,11 @@ class Thinned:
 
 
 def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
-    """Block averages where a record of many frames loses nothing by it.
+    """Average blocks of frames if a long record loses no information by it.
 
-    Blocks are short beside the time in which the motion changes. What the motion bends within a block is
-    taken out of its mean (to the fourth order in the block's length), and blocks are so short that what is
-    left stays below the noise of a mean.
+    Blocks are short compared with the time in which the motion changes. The effect of the motion's curvature
+    is subtracted from each mean (to the fourth order in the block's length), and blocks are short enough that
+    the rest is below the noise of a mean.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
     measurement = unwrapped(measurement, angles)
     n = int(measurement.seen.sum())
     many = MANY_DRIVEN if measurement.inputs else MANY
-    # A frame with a lost column counts as lost; sensors with rates of their own have no blocks in common.
+    # A frame without one of the columns counts as lost; sensors with different rates have no common blocks.
     whole = np.asarray(np.isfinite(measurement.values).all(axis=1))
     if n <= many or whole.sum() < _WHOLE * n:
         return Thinned(measurement, 1, n, {})
@@ -80,19 +81,19 @@ def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
     step = float(np.median(np.diff(t)))
     every = int(min(_change(t, values, step) / _BLOCKS / step, -(-2 * n // many)))
     while every > 1:
-        found = _averaged(measurement, whole, t, values, step, every)
-        if found is not None:
+        averaged = _averaged(measurement, whole, t, values, step, every)
+        if averaged is not None:
             steps = {name: lattice(x) for name, x in zip(measurement.names, values.T, strict=True)}
-            return Thinned(found, every, n, steps)
+            return Thinned(averaged, every, n, steps)
         every = int(_SHORTER * every)
     return Thinned(measurement, 1, n, {})
 
 
 def _change(t: Array, values: Array, step: float) -> float:
-    """How long the motion takes to change, s: the least over the columns of spread over rate.
+    """Return the time in which the motion changes, s: the minimum over the columns of spread over rate.
 
-    Rates are differences over the shortest time in which the motion goes far beyond its noise. A motion that
-    dies down may do so within a stretch of the record alone; one that never does restricts no block.
+    Rates are differences over the shortest time in which the motion far exceeds its noise. A motion that
+    decays may do so in a part of the record only; one that never does restricts no block.
     """
     noises = [_noise(x) for x in values.T]
 
@@ -108,7 +109,7 @@ def _change(t: Array, values: Array, step: float) -> float:
 
 
 def _change_of(t: Array, x: Array, step: float, noise: float) -> float:
-    """How long one column takes to change, s; infinite if it never goes far beyond its noise."""
+    """Return the time in which one column changes, s; infinite if it never far exceeds its noise."""
     spread, lag = float(x.std()), 1
     while lag < len(x) // 4:
         moved = np.abs(x[lag:] - x[:-lag])[t[lag:] - t[:-lag] < 1.5 * lag * step]
@@ -119,7 +120,7 @@ def _change_of(t: Array, x: Array, step: float, noise: float) -> float:
 
 
 def _noise(x: Array) -> float:
-    """Standard deviation of a column's noise, from fifth differences: those of a motion are small."""
+    """Estimate the s.d. of a column's noise from fifth differences, in which motion is small."""
     return noise_by_differences(x, 5)
 
 
@@ -131,7 +132,7 @@ def _averaged(
     step: float,
     every: int,
 ) -> Measurement | None:
-    """Average blocks of so many of the whole frames; None if blocks are too long for how the motion bends."""
+    """Average blocks of `every` complete frames; None if the motion has too much curvature in a block."""
     length = every * step
     part = np.floor((t - t[0]) / length * _PARTS + 1e-9).astype(np.int64)
     block = part // _PARTS
@@ -154,39 +155,41 @@ def _averaged(
         mean = means(x)
         bend = np.zeros(number)
         bend[inside] = mean[inside - 1] - 2 * mean[inside] + mean[inside + 1]
-        # A mean over a block is off by a 24th of the second difference, and then by little of the fourth.
+        # A block mean is off by 1/24 of the second difference, plus a small share of the fourth.
         bends = inside[np.isin(inside - 1, inside) & np.isin(inside + 1, inside)]
         fourth = bend[bends - 1] - 2 * bend[bends] + bend[bends + 1]
-        left = 0.0047 * np.sqrt(max(float(np.mean(fourth**2)) - 70 * noise**2, 0.0)) if len(bends) else 0.0
-        if left > _BIAS * noise:
+        remainder = (
+            0.0047 * np.sqrt(max(float(np.mean(fourth**2)) - 70 * noise**2, 0.0)) if len(bends) else 0.0
+        )
+        if remainder > _BIAS * noise:
             return None
-        # A block beside a gap has no second difference: it stands where its bend would not show.
+        # A block next to a gap has no second difference, so its mean is not corrected, and it is dropped.
         columns.append(mean - bend / 24)
         if measurement.sigma is None:
             sigmas.append(np.full(number, noise))
         else:
             stated = means(measurement.sigma[whole, k] ** 2)
             sigmas.append(np.maximum(np.sqrt(stated / least), noise))
-    bent = np.zeros(number, dtype=bool)
-    bent[inside] = True
-    kept &= bent
-    # The model's time counts from the first row, which stays where it was, with nothing seen in it.
+    has_correction = np.zeros(number, dtype=bool)
+    has_correction[inside] = True
+    kept &= has_correction
+    # The model's time counts from the first row, which stays in place, without observations.
     rest = np.flatnonzero(kept)
     if not len(rest):
         return None
     rows = np.concatenate([rest[:1], rest])
     rho = measurement.rho
     if rho is not None:
-        rho = np.column_stack([means(own) for own in rho[whole].T])[rows]
+        rho = np.column_stack([means(correlations) for correlations in rho[whole].T])[rows]
     meta = dict(measurement.meta)
-    if is_encoder(measurement):  # means lie on no lattice, by which it would be told
+    if is_encoder(measurement):  # means lie on no lattice, by which an encoder is recognised
         meta["sensor"] = "encoder"
     if isinstance(meta.get("fps"), (int, float)):
         meta["fps"] = meta["fps"] / every
     times = np.concatenate([measurement.t[:1], times[rest]])
     mean = np.column_stack(columns)[rows]
     mean[0] = np.nan
-    # What a disk's or a pendulum's record does not state is known of such records.
+    # Records of a disk or a pendulum that do not state their noise have a known one.
     sigma = np.column_stack(sigmas)[rows]
     return Measurement(
         times,
@@ -201,7 +204,7 @@ def _averaged(
 
 
 def _part_noise(part: NDArray[np.int64], x: Array) -> float:
-    """The noise of means over parts of a block: what is slower than frames is in it too."""
+    """Estimate the noise of means over parts of a block, which includes noise slower than frames."""
     number = int(part[-1]) + 1
     count = np.bincount(part, minlength=number)
     mean = np.bincount(part, x, minlength=number)[count > 0] / count[count > 0]

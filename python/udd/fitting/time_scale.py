@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from .problem import Fit
 
-_UNITS = 24  # that the part which is fitted should at least be long
+_UNITS = 24  # minimum length of the fitted part, in units of the time scale
 
 
 def correlation_time(fit: Fit) -> float:
-    """The least over the states of standard deviation over root mean square rate; 0 where nothing moves."""
+    """Return the smallest ratio, over the states, of s.d. to r.m.s. rate; 0 if all are constant."""
     linked, dt = fit.record.linked, np.diff(fit.record.t)
     rates = np.diff(fit.states, axis=0)[linked] / dt[linked, None]
     times = takes_to_change(fit.states, rates)
@@ -19,18 +19,18 @@ def correlation_time(fit: Fit) -> float:
 
 
 def takes_to_change(values: NDArray[np.float64], rates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviation over root mean square rate of each column; 0 of one that does not move."""
+    """Return the ratio of standard deviation to r.m.s. rate for each column; 0 for a constant column."""
     spread, rate = values.std(axis=0), np.sqrt((rates**2).mean(axis=0))
     result: NDArray[np.float64] = np.divide(spread, rate, out=np.zeros_like(spread), where=rate > 0)
     return result
 
 
 def motion_time_scale(fit: Fit) -> float:
-    """The unit of the times of this module: a second, or four times what a user's own motion takes to change.
+    """Return the unit of time for this package: 1 s, or four correlation times of a user's own model.
 
-    As on the disk, where that is a quarter of a second. It is the least over the states of the standard
-    deviation over the root mean square rate. For a short record the unit is shorter, but not below that, so
-    that the part held out has enough blocks to resample.
+    On the disk four correlation times are 1 s as well. The correlation time is the minimum over the states of
+    standard deviation over r.m.s. rate. For a short record the unit is shorter (but not below one correlation
+    time), so that the held-out part has enough blocks to resample.
     """
     if not fit.model.profile.written:
         return 1.0

@@ -27,7 +27,7 @@ _CAMERA, _NOISE, _MODEL = "camera", "noise", "model error"
 
 @dataclass(frozen=True, repr=False)
 class Budget(OneLine):
-    """From what the uncertainty of each fitted number comes.
+    """Uncertainty of each fitted number, by source.
 
     Attributes
     ----------
@@ -35,13 +35,17 @@ class Budget(OneLine):
         The fitted numbers.
     units : dict of str to str
     sources : tuple of str
-        What uncertainty comes from: ``noise`` of the frames, ``camera`` (what is known of it beforehand),
-        ``scale`` and the model's parameters with a prior, by name; what was fixed, by name; and
-        ``model error``, where the fit shows that something is missing.
+        Names of the sources: ``noise`` of the frames; ``camera`` (its priors); ``scale`` and the model's
+        parameters with a prior; the fixed parameters; and ``model error`` if the fit shows that something is
+        missing.
     contributions : ndarray, shape (number of values, number of sources)
-        Standard uncertainties, in the values' units; what comes from different sources is independent.
+        Standard uncertainties, in the values' units. Different sources are independent.
     k : float
         The coverage factor of the expanded uncertainty.
+
+    See Also
+    --------
+    udd.Fit.budget : compute it.
     """
 
     values: dict[str, float]
@@ -63,13 +67,13 @@ class Budget(OneLine):
 
     @property
     def shares(self) -> NDArray[np.float64]:
-        """Which part of the variance of each value comes from each source; each row adds up to 1."""
+        """Share of each source in the variance of each value; each row adds up to 1."""
         squares = np.square(self.contributions)
         result: NDArray[np.float64] = squares / squares.sum(axis=1, keepdims=True)
         return result
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the budget as JSON-ready values."""
         return {
             "k": self.k,
             "budget": {
@@ -85,7 +89,7 @@ class Budget(OneLine):
         }
 
     def __str__(self) -> str:
-        """A table: values with expanded uncertainties, and the shares of the variance in %."""
+        """Format a table: values with expanded uncertainties, and the shares of the variance in %."""
         shares = 100 * self.shares
         head = f"{'':<16}{'value':>12}  {f'U (k = {self.k:g})':<20}" + "".join(
             f"{s:>12}" for s in self.sources
@@ -100,7 +104,7 @@ class Budget(OneLine):
 
 @renamed(held="fixed")
 def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
-    """Uncertainty budget (GUM) of a fit's numbers.
+    """Compute the uncertainty budget (GUM) of a fit's numbers.
 
     Parameters
     ----------
@@ -114,19 +118,21 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
     Returns
     -------
     Budget
-        Of the model's free parameters; the camera's are among the sources.
+        Values, units, sources and contributions of the model's free parameters; the camera's are among the
+        sources.
 
     Raises
     ------
     FitError
-        A name that the model does not have or that was free, an uncertainty that is not positive.
+        A name is not a parameter of the model, or was free; or an uncertainty is not positive.
 
     Notes
     -----
     The fit's covariance is ``C = (N + P)^-1`` with the information N of the frames and P of the priors, so
     ``C = C N C + C P C``: the prior of a parameter j, of standard deviation s_j, contributes ``|C_ij|/s_j``
-    to the uncertainty of i, and the rest is the noise's. What was fixed is moved by its standard uncertainty
-    and the model fitted again: what moves with it is its contribution.
+    to the uncertainty of i, and the rest comes from the noise. Each fixed parameter is changed by its
+    standard uncertainty and the model is fitted again; the changes of the free parameters are its
+    contributions.
 
     References
     ----------
@@ -144,24 +150,26 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
     """
     k = number("k", k, above=0.0)
     free = fit.problem.free
-    known = {f.name.partition("[")[0] for f in free}
+    free_names = {f.name.partition("[")[0] for f in free}
     if fixed is None:
-        fixed = {name: sd for name, sd in fit.model.profile.fit.fixed.items() if name not in known}
+        fixed = {name: sd for name, sd in fit.model.profile.fit.fixed.items() if name not in free_names}
     fixed = {name: number(name, value, above=0.0) for name, value in fixed.items()}
     for name in fixed:
         if name not in fit.model.parameters:
             raise FitError(f"the model has no parameter {name!r}; it has {', '.join(fit.model.parameters)}")
-        if name in known:
-            raise FitError(f"{name} was free, and what is known of it is its prior")
+        if name in free_names:
+            raise FitError(f"{name} was free: its prior already counts; give a prior in udd.fit instead")
     rows = [i for i, f in enumerate(free) if f.role == "model"]
     factor = fit.widened
-    covariance = fit.covariance / factor**2  # without what the model may miss
+    covariance = fit.covariance / factor**2  # without the inflation for missing physics
     variances: dict[str, NDArray[np.float64]] = {_NOISE: np.diag(covariance)[rows].copy()}
-    for j, one in enumerate(free):
-        if not np.isfinite(one.sd):
+    for j, parameter in enumerate(free):
+        if not np.isfinite(parameter.sd):
             continue
-        share = np.square(covariance[rows, j] / one.sd)
-        source = one.name if one.role == "model" or one.name.startswith("scale") else _CAMERA
+        share = np.square(covariance[rows, j] / parameter.sd)
+        source = (
+            parameter.name if parameter.role == "model" or parameter.name.startswith("scale") else _CAMERA
+        )
         variances[source] = variances.get(source, 0.0) + share
         variances[_NOISE] -= share
     for name, sd in fixed.items():
@@ -180,10 +188,10 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
 
 
 def _moved(fit: Fit, name: str, by: float) -> NDArray[np.float64]:
-    """By how much each free parameter moves where one that was fixed is moved."""
+    """Compute the change of each free parameter if a fixed one is changed."""
     problem = fit.problem
     order = list(fit.model.parameters).index(name)
-    models = tuple(own.with_parameters({name: own.parameters[name] + by}) for own in problem.models)
+    models = tuple(model.with_parameters({name: model.parameters[name] + by}) for model in problem.models)
     sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fit.point.sets]
     for values, _camera, _clock in sets:
         values[order] += by
