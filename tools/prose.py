@@ -107,15 +107,18 @@ def split_sentences(paragraph: Lines) -> Iterator[Sentence]:
 
 
 def split_paragraphs(lines: Lines) -> Iterator[Lines]:
-    """Split lines at blank ones, at gaps of the line numbers, at list items and at underlined headings."""
+    """Split lines at blank ones, gaps of the line numbers, list items, headings and numpydoc entries."""
     paragraph: Lines = []
+    after_entry = False
     for number, line in lines:
         item = re.match(r"\s*([-*]|\d+\.)\s+", line)
+        entry = re.match(r"\s*[\w.*]+(, [\w.*]+)* : \S", line)
         blank = not line.strip() or re.fullmatch(r"\s*[-=#~`]{3,}\s*", line)
         gap = paragraph and number > paragraph[-1][0] + 1
-        if paragraph and (blank or item or gap):
+        if paragraph and (blank or item or gap or entry or after_entry):
             yield paragraph
             paragraph = []
+        after_entry = entry is not None
         if not blank:
             paragraph.append((number, line[item.end() :] if item else line))
     if paragraph:
@@ -140,16 +143,16 @@ def read_python(source: str) -> Iterator[Lines]:
             yield without_examples([(number, row.replace('"""', "")) for number, row in text])
         else:
             yield [(node.lineno, " ".join(value.split()))]
-    comments = (
-        token
-        for token in tokenize.generate_tokens(io.StringIO(source).readline)
-        if token.type == tokenize.COMMENT
-    )
-    yield [
-        (token.start[0], token.string.lstrip("#: "))
-        for token in comments
-        if not re.match(r"#( type:| noqa|!)", token.string)
-    ]
+    block: Lines = []
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type != tokenize.COMMENT or re.match(r"#( type:| noqa|!)", token.string):
+            continue
+        comment = (token.start[0], token.string.lstrip("#: "))
+        if token.line[: token.start[1]].strip():  # after code: no part of the comment below it
+            yield [comment]
+        else:
+            block.append(comment)
+    yield block
 
 
 def without_examples(lines: Lines) -> Lines:

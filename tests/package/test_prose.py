@@ -81,6 +81,19 @@ at the origin. It must be bounded.
 what it prints is not read
 """
 
+def spectrum(t):
+    """Compute a spectrum.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        times of the frames
+    dt : float
+        longest step that is allowed
+    """
+    return t  # returns the times themselves
+
+
 # The first comment has
 # two lines.
 raise ValueError(f"the step is {step}, below the limit of 1")
@@ -118,8 +131,12 @@ what = "code is no prose either"
                 (1, 1, "Compute the spectrum of a model."),
                 (3, 4, "The orbit starts at the origin."),
                 (4, 4, "It must be bounded."),
-                (10, 11, "The first comment has two lines."),
-                (12, 12, "the step is X, below the limit of 1"),
+                (15, 15, "t : ndarray, shape (n,)"),
+                (16, 16, "times of the frames"),
+                (18, 18, "longest step that is allowed"),
+                (20, 20, "returns the times themselves"),
+                (23, 24, "The first comment has two lines."),
+                (25, 25, "the step is X, below the limit of 1"),
             },
         ),
         (
