@@ -47,5 +47,7 @@ def test_what_the_data_cannot_say_is_told() -> None:
 def test_a_state_that_is_asked_for_is_named() -> None:
     t = np.arange(0.0, 10.0, 0.05)
     apart = udd.Model(["x", "y"], ["-k*x", "-ln(y)"], {"k": 0.3})
-    with pytest.raises(FitError, match=r"y is not observed: say where the motion starts, state0=\{'y': ...\}"):
+    with pytest.raises(
+        FitError, match=r"y is not observed: say where the motion starts, state0=\{'y': ...\}"
+    ):
         udd.fit(udd.Measurement(t, {"x": np.exp(-0.3 * t) + 1e-3 * np.sin(77 * t)}), apart)

@@ -51,7 +51,9 @@ def test_what_is_too_short_together_or_alone_is_refused():
         udd.fit(records(1, 8)[0], SPRING)
     with pytest.raises(FitError, match="the measurements hold 8 usable frames; a fit needs at least 10"):
         udd.fit(records(2, 4), SPRING)
-    with pytest.raises(FitError, match=r"holds 3 usable frames; in a joint fit each measurement needs at least 4"):
+    with pytest.raises(
+        FitError, match=r"holds 3 usable frames; in a joint fit each measurement needs at least 4"
+    ):
         udd.fit(records(20, 3), SPRING)
     with pytest.raises(FitError, match="all values are constant"):
         udd.fit([udd.Measurement(np.arange(8.0), {"x": np.zeros(8)})] * 3, SPRING)

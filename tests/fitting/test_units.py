@@ -211,10 +211,10 @@ def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
     far = replace(fit, parameters={**fit.parameters, "W": 0.2 * discovered.DRIVE})
     doubted = replace(found, fit=far)
     (remark,) = doubted.remarks
-    assert remark.startswith("The fit leaves what was stated: W = 0.0084 m/s")
+    assert remark.startswith("The fit leaves what was stated: W = 0.0084 ± ")
     # It stands beside the verdict, not instead of it.
     assert as_text(summary_of(doubted)).splitlines()[0] == as_text(summary_of(found)).splitlines()[0]
-    assert f"  {remark}\n" in as_text(summary_of(doubted))
+    assert f"  {remark}\n".replace("±", "+-") in as_text(summary_of(doubted))
     doubted.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert f'<p class="warn">{remark}</p>' in page and "<strong>effect" in page

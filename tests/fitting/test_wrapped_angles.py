@@ -81,7 +81,7 @@ def test_frames_that_are_not_usable_move_no_other_by_a_turn():
 
 def test_what_is_no_angle_of_the_model_stays_and_is_reported():
     plain = udd.Model(["q", "v"], ["v", "-k*sin(q) - c*v"], {"k": 9.0, "c": 0.15})
-    with pytest.warns(UserWarning, match=r'q jumps by a turn.* angles=\["q"\] in udd.Model'):
+    with pytest.warns(UserWarning, match=r'q jumps by a turn.* angles=\["q"\] to udd.Model'):
         found = udd.fit(wrapped(rotor()), plain)
     assert np.ptp(found.measurement["q"]) < TURN
 

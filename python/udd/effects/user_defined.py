@@ -74,7 +74,7 @@ class CurveSpec(FormulaSpec):
     low, high : float
         Its ends.
     periodic : bool
-        Whether its end is joined to its beginning.
+        True if its end is joined to its beginning.
     """
 
     coordinate: str
@@ -145,7 +145,7 @@ class SurfaceSpec(FormulaSpec):
     shape : tuple of int
         Number of coefficients along each coordinate.
     periodic : bool
-        Whether its end is joined to its beginning along the second coordinate.
+        True if its end is joined to its beginning along the second coordinate.
     """
 
     coordinates: tuple[str, str]
@@ -303,7 +303,7 @@ def curve(
     coefficients : array_like, shape (n,)
         At least four. They become the parameters ``c0``, ``c1``, ..., all amplitudes.
     periodic : bool
-        Whether its end is joined to its beginning, as over an angle from 0 to 2 pi.
+        True if its end is joined to its beginning, as over an angle from 0 to 2 pi.
     momentum : {"consistent", "constraint"}, optional
         Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str
@@ -381,7 +381,7 @@ def surface(
     coefficients : array_like, shape (m, n)
         At least four along each. They become the parameters ``c0``, ``c1``, ... row by row, all amplitudes.
     periodic : bool
-        Whether its end is joined to its beginning along the second coordinate, as over an angle.
+        True if its end is joined to its beginning along the second coordinate, as over an angle.
     momentum : {"consistent", "constraint"}, optional
         Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str

@@ -63,15 +63,17 @@ class RunawayParameter:
     value: float
     stated: float
     sd: float
+    error: float | None = None
 
     @property
     def text(self) -> str:
         """The warning, in one sentence."""
         unit = f" {self.unit}" if self.unit else ""
+        error = "" if self.error is None else f" ± {self.error:.2g}"
         if not np.isfinite(self.sd):
-            return f"{self.name} = {self.value:.4g}{unit}; expected a positive value"
+            return f"{self.name} = {self.value:.4g}{error}{unit}; expected a positive value"
         return (
-            f"{self.name} = {self.value:.4g}{unit}; expected {self.stated:.4g} ± {self.sd:.2g}{unit}: "
+            f"{self.name} = {self.value:.4g}{error}{unit}; expected {self.stated:.4g} ± {self.sd:.2g}{unit}: "
             f"{abs(self.value - self.stated) / self.sd:.1f} standard deviations off"
         )
 
@@ -92,7 +94,7 @@ class Reading(OneLine):
     memory : float
         Lag-1 autocorrelation of the noise.
     trusted : bool
-        Whether a fit weights the frames by the noise that they show. False for a film whose frames scatter by
+        True if a fit weights the frames by the noise that they show. False for a film whose frames scatter by
         less than its geometric error.
     """
 
@@ -139,7 +141,7 @@ class Diagnostics:
     missed : list of ModelError
         One for every equation except those in which one state is the rate of another.
     tight : bool
-        Whether the model error could be reduced to that of a right model.
+        True if the model error could be reduced to that of a right model.
     white : dict of str to float
         Probability that the innovations of each channel are white noise (Ljung-Box). Channels with negligible
         innovations are left out; empty if the record is too short.
@@ -151,7 +153,7 @@ class Diagnostics:
     rests : float or None
         Time from which on the disk of a film is at rest, s; later frames are left out.
     filmed : bool
-        Whether it is a film, whose own faults colour even a right model's innovations.
+        True if it is a film, whose own faults colour even a right model's innovations.
     inputs : list of NoisyInput
         The inputs with noisy samples.
     by_inputs : list of float
@@ -384,11 +386,11 @@ def ran_off(fit: Fit) -> list[RunawayParameter]:
     result, unit_of = [], units(fit)
     for free in fit.problem.free:
         value = fit.parameters[free.name]
-        unit = unit_of[free.name]
+        unit, error = unit_of[free.name], fit.errors[free.name]
         if np.isfinite(free.sd) and abs(value - free.mean) > _OFF * free.sd:
-            result.append(RunawayParameter(free.name, unit, value, free.mean, free.sd))
-        elif _is_friction(free) and value < -_OFF * fit.errors[free.name]:
-            result.append(RunawayParameter(free.name, unit, value, free.mean, np.inf))
+            result.append(RunawayParameter(free.name, unit, value, free.mean, free.sd, error))
+        elif _is_friction(free) and value < -_OFF * error:
+            result.append(RunawayParameter(free.name, unit, value, free.mean, np.inf, error))
     return result
 
 

@@ -40,7 +40,7 @@ class Observations:
     information : ndarray (n, m, m)
         The inverse of each frame's noise covariance; zero if nothing was observed.
     linked : ndarray of bool (n - 1,)
-        Whether the model leads from a frame to the next.
+        True if the model leads from a frame to the next.
     film : ndarray of int (n,)
     autocorrelation : list of float (m,)
         Lag-1 autocorrelation of each channel's noise.

@@ -80,7 +80,7 @@ def fit(
         ``k0, length, inertia`` for a pendulum, in both cases with the amplitudes of all effects; all
         parameters of a user's own model.
     camera : bool or iterable of str
-        Whether the camera's parameters are free, or the names of those that are. A disk has the pivot ``y0,
+        True if the camera's parameters are free, or the names of the free ones. A disk has the pivot ``y0,
         z0``, ``tilt``, ``scale``, the marks' centre ``right, up`` relative to the disk's, ``lag`` of the
         orientation, ``row`` time of a rolling shutter, ``shutter`` for means over an exposure, ``lens`` and
         ``clock``. A pendulum has ``theta0, aside, above``; if an encoder read it, only the zero ``theta0``.

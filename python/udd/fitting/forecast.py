@@ -196,7 +196,7 @@ def forecast(
         For a fit of several measurements: number of the one with the camera and the drive of this one.
         Default: the one that is identical.
     process : bool
-        Whether random kicks act on the members. False treats the model's equations as exact.
+        True if random kicks act on the members. False treats the model's equations as exact.
     rng : int, Generator or None
         Seed of the ensemble. The same whole number gives the same ensemble; None takes fresh entropy.
 

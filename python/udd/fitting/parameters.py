@@ -56,7 +56,7 @@ def free_parameters(
         Names of the model's free parameters. By default ``k0, k1, k2, W`` of a disk, ``k0, length, inertia``
         of a pendulum, and the amplitudes of all effects.
     camera : bool or iterable of str
-        Whether the camera's parameters are free, or the names of those that are.
+        True if the camera's parameters are free, or the names of the free ones.
     priors : mapping of str to (mean, standard deviation), optional
         Replaces the default priors.
     each : iterable of str, optional

@@ -52,7 +52,7 @@ class Problem(OneLine):
     models : tuple of Model
         One per film; they differ only in parameter values.
     likeliest : bool
-        Whether the model error is the most probable one; else it is as small as possible.
+        True if the model error is the most probable one; else it is as small as possible.
     """
 
     models: tuple[Model, ...]

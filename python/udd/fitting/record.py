@@ -50,7 +50,7 @@ class Record(OneLine):
     rho : ndarray (n, m, m)
         Correlation of the channels' errors.
     linked : ndarray of bool (n - 1,)
-        Whether frame i + 1 continues the motion of frame i.
+        True if frame i + 1 continues the motion of frame i.
     states : ndarray (n, d)
         A first guess of the states.
     odd : ndarray of bool (n,)
@@ -382,7 +382,7 @@ def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray
         step = np.abs(np.diff(filled, axis=0))
         off[2:-2][off[2:-2] < _LEAP * np.maximum(step[:-3], step[3:])] = 0.0
         off[~inside | odd] = 0.0
-        # Of adjacent outliers only the worst is removed in a round: it distorts the cubics of the others.
+        # Only the worst of adjacent outliers is removed in a round: it distorts the cubics of the others.
         far = (off / typical).max(axis=1)
         is_odd = (far > _ODD) & (far >= maximum_filter1d(far, 5))
         if not is_odd.any():

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 #: Frames above which a record is thinned, to about half of them.
 MANY = 8000
-#: The same if inputs were measured: a run takes a step for each of their samples.
+#: The same if inputs were measured: a run needs a step for each of their samples.
 MANY_DRIVEN = 2000
 #: Minimum of blocks in the time in which the motion changes (its spread over its fast rates).
 _BLOCKS = 2
@@ -48,7 +48,7 @@ class Thinned:
     frames : int
         Frames before thinning.
     steps : dict of str to float
-        Step in which each column was read, which its means no longer show; 0 if there is none.
+        Step in which each column was read, which its means no longer show; 0 if it has none.
     """
 
     measurement: Measurement

@@ -103,7 +103,7 @@ def reproduce(
     only : iterable of str, optional
         Keys of figures and claims (see :data:`FIGURES`, :data:`CLAIMS`); default: all.
     films : bool
-        Whether to include figures and claims that need films, which take minutes the first time.
+        True to include figures and claims that need films, which take minutes the first time.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. Default: a bar
         after 2 s in a terminal or a notebook.

@@ -31,11 +31,11 @@ class Figure:
         Number of the figure in the paper, or the section that it belongs to.
     title, caption : str
     filmed : bool
-        Whether it needs films to be made and tracked.
+        True if it needs films to be made and tracked.
     draw : callable
         Makes the picture.
     vector : bool
-        Whether it is stored as vector graphics (SVG), for simple drawings.
+        True if it is stored as vector graphics (SVG), for simple drawings.
     """
 
     key: str
@@ -78,7 +78,7 @@ class Claim:
     says : str
         The claim, in short.
     filmed : bool
-        Whether it needs films to be made and tracked.
+        True if it needs films to be made and tracked.
     check : callable
         Computes it.
     """
