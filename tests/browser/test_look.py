@@ -32,6 +32,29 @@ def test_dark_and_projector_are_kept_over_a_reload(opened: Opened) -> None:
     assert axe.Axe().run(page).violations_count == 0
 
 
+INKED = """(id) => {
+  const canvas = document.getElementById(id);
+  const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  const colours = new Set();
+  for (let k = 0; k < data.length; k += 4) colours.add(data[k] << 16 | data[k + 1] << 8 | data[k + 2]);
+  return colours.size;
+}"""
+
+
+@pytest.mark.parametrize(
+    ("tab", "canvas"), [("section", "section"), ("section", "return"), ("diagram", "exponent")]
+)
+def test_a_map_is_drawn_again_in_other_colours(opened: Opened, tab: str, canvas: str) -> None:
+    page = opened.go(f"#model=dle&w=3.9&state=1,1,0.01&tab={tab}")
+    until(page, "udd.sections.points.length > 0 || udd.diagram.exponents")
+    page.evaluate("udd.play(false)")
+    for _ in range(2):
+        page.wait_for_timeout(200)
+        assert page.evaluate(INKED, canvas) > 3
+        page.click("#dark")
+    opened.said.clear()  # the browser remarks that the test reads pixels
+
+
 def test_a_phone_shows_the_disk_and_play_at_once_and_scrolls(browser: Any, link: str) -> None:
     SIZES["phone"] = (390, 844)
     one = Opened(browser, link, "phone")

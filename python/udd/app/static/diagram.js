@@ -174,9 +174,8 @@ export class Diagram {
   draw() {
     if (!this.axes.fit() || !this.below.fit()) return;
     const now = this.page.home.model[this.drive.name];
-    const look = `${this.axes.width} ${this.axes.height} ${now}`;
-    if (!this.dirty && look === this.look) return;
-    this.look = look;
+    if (!(this.dirty || this.axes.blank || this.below.blank || now !== this.now)) return;
+    this.now = now;
     this.dirty = false;
     const scale = this.drive.scale;
     const [low, high] = (this.found ? [this.found.drive[0], this.found.drive.at(-1)] : [this.drive.least, this.drive.most]).map((x) => x * scale);

@@ -44,16 +44,20 @@ function table(page, run, more = {}) {
 /** All pictures that are shown, as on the page but at least twice as sharp, with their titles and the run's parameters. */
 function picture(page) {
   const ratio = Math.max(2, window.devicePixelRatio || 1);
+  const size = parseFloat(getComputedStyle(document.body).fontSize);
   const shown = [...$("explore").querySelectorAll("canvas")].filter((c) => c.offsetParent && c.width);
-  const titles = [...$("explore").querySelectorAll("figcaption")].filter((e) => e.offsetParent);
-  const boxes = shown.map((c) => c.getBoundingClientRect());
-  const heads = titles.map((e) => e.getBoundingClientRect());
+  const titles = [...$("explore").querySelectorAll("figcaption, #maps [aria-selected=true]")].filter((e) => e.offsetParent);
+  const place = (e) => {
+    const { left, right, top, bottom, width, height } = e.getBoundingClientRect();
+    return { left, right, top, bottom, width, height };
+  };
+  const [boxes, heads] = [shown.map(place), titles.map(place)];
   const all = [...boxes, ...heads];
+  closed(boxes.filter((_, k) => shown[k].closest("#maps")), heads.find((_, k) => titles[k].closest("#maps")), all, 1.8 * size);
   const [left, top] = [Math.min(...all.map((b) => b.left)), Math.min(...all.map((b) => b.top))];
   const wide = Math.max(...all.map((b) => b.right)) - left;
   const made = document.createElement("canvas");
   const c = made.getContext("2d");
-  const size = parseFloat(getComputedStyle(document.body).fontSize);
   const font = (bold) => `${bold ? "600 " : ""}${size}px "Source Sans 3", "Helvetica Neue", Arial, sans-serif`;
   c.font = font(false);
   const lines = wrapped(c, page.describe(), wide - size);
@@ -77,6 +81,16 @@ function picture(page) {
   c.fillStyle = SOFT;
   for (const [k, b] of heads.entries()) c.fillText(titles[k].textContent, b.left - left + size * 0.5, b.top - top + head + 2);
   return made;
+}
+
+/** Move the maps up over the controls that stand between them and the views; their title comes right above them. */
+function closed(maps, title, all, room) {
+  if (!maps.length || !title) return;
+  const top = Math.min(...maps.map((b) => b.top));
+  const above = Math.max(...all.filter((b) => b !== title && !maps.includes(b)).map((b) => b.bottom));
+  const gap = Math.max(0, top - room - above);
+  for (const b of maps) Object.assign(b, { top: b.top - gap, bottom: b.bottom - gap });
+  Object.assign(title, { left: maps[0].left, right: maps[0].right, top: top - gap - room, bottom: top - gap });
 }
 
 /** A text in lines that are no wider than this; it is broken after commas. */

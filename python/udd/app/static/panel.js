@@ -11,7 +11,7 @@ function slider(about, value, label, changed) {
   const id = `p-${about.name}`;
   const scaled = (v) => +(v * about.scale).toPrecision(12);
   const digits = Math.max(0, -Math.floor(Math.log10(about.step * about.scale) + 1e-9));
-  box.innerHTML = `<div class="row"><label for="${id}"></label><input><span class="unit"></span></div><input type="range">`;
+  box.innerHTML = `<div class="row"><label for="${id}"></label><span class="value"><input><span class="unit"></span></span></div><input type="range">`;
   const [number, range] = box.querySelectorAll("input");
   box.querySelector("label").textContent = label;
   box.querySelector(".unit").textContent = about.unit;

@@ -67,6 +67,15 @@ export class PhaseView extends Canvas {
     }
   }
 
+  /** A label beyond the end of an axis, within the canvas; that of the upright axis stands above it. */
+  label(c, text, x, y, upright) {
+    const wide = c.measureText(text).width;
+    const left = upright ? x - wide / 2 : x < this.width / 2 ? x - wide : x;
+    c.textAlign = "left";
+    c.fillText(text, Math.max(2, Math.min(this.width - wide - 2, left)), upright ? y - this.text : y);
+    c.textAlign = "center";
+  }
+
   frame(c, project, labels) {
     const [x, y, z] = this.reach;
     const corner = (k) => project(k & 1 ? x : -x, k & 2 ? y : -y, k & 4 ? z : -z);
@@ -85,7 +94,7 @@ export class PhaseView extends Canvas {
       line(c, ...project(...end.map((v) => -v)), ...project(...end));
       const [name, unit, scale] = labels[k];
       c.fillStyle = INK;
-      c.fillText(unit ? `${name} [${unit}]` : name, ...project(...end.map((v) => 1.36 * v)));
+      this.label(c, unit ? `${name} [${unit}]` : name, ...project(...end.map((v) => 1.15 * v)), k === 2);
       c.fillStyle = SOFT;
       const small = c.font;
       c.font = small.replace(/^[\d.]+/, (size) => String(size * 0.8));

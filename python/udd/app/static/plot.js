@@ -33,6 +33,7 @@ export class Canvas {
     this.context = element.getContext("2d");
     this.width = this.height = 0;
     this.changed = true;
+    this.blank = true; // whether nothing was drawn since its size or colours changed
     canvases.add(this);
     new ResizeObserver(() => (this.changed = true)).observe(element);
   }
@@ -47,12 +48,14 @@ export class Canvas {
       this.element.width = Math.round(this.width * sharp);
       this.element.height = Math.round(this.height * sharp);
       this.context.setTransform(sharp, 0, 0, sharp, 0, 0);
+      this.blank = true;
       this.text = parseFloat(getComputedStyle(this.element).fontSize) * 0.85;
     }
     return this.width > 20 && this.height > 20;
   }
 
   clear(colour = GROUND) {
+    this.blank = false;
     this.context.fillStyle = colour;
     this.context.fillRect(0, 0, this.width, this.height);
   }

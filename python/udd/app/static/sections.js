@@ -62,9 +62,8 @@ export class Sections {
   draw() {
     const about = this.page.about(this.model?.kind ?? this.page.home.model.kind);
     const fits = [this.section.fit(), this.return.fit()];
-    if (!fits.every(Boolean) || !(this.dirty || this.section.wasSize !== `${this.section.width} ${this.section.height}`)) return;
+    if (!fits.every(Boolean) || !(this.dirty || this.section.blank || this.return.blank)) return;
     this.dirty = false;
-    this.section.wasSize = `${this.section.width} ${this.section.height}`;
     const names = about.states;
     const surface = this.select.value;
     const across = surface === "reversals" ? 1 : names.indexOf(names[1]);
