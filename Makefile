@@ -150,7 +150,7 @@ lock: .venv/.made ## write requirements/*.txt anew, with today's versions
 	$(PART) requirements/docs.txt pyproject.toml --extra docs
 
 clean: ## remove .venv and everything that was built
-	rm -rf .venv .venv-peers build dist demo paper docs/_build target .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers build dist demo docs/_build docs/api/generated target .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 

@@ -17,8 +17,17 @@ author = "The udd developers"
 copyright = "the udd developers"
 release = version = version_of("udd")
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc", "mathml"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+    "mathml",
+    "command_reference",
+]
 exclude_patterns = ["_build"]
+templates_path = ["_templates"]
+myst_heading_anchors = 3
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 
 # Every page is run when it is built; an error in a cell ends the build.
@@ -40,7 +49,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "udd"
 html_static_path = ["_static"]
 html_css_files = ["udd.css"]
-html_sidebars = {"[!a]*": [], "api/*": ["sidebar-nav-bs"]}
+html_sidebars = {"index": [], "**": ["sidebar-nav-bs"]}
 html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": True,

@@ -12,7 +12,7 @@ import pytest
 
 from udd.cli import main
 from udd.cli.parser import make_parser
-from udd.examples import make, write
+from udd.examples import make
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "command-line.md"
 #: Commands with these words take from ten seconds to minutes and run at night.
@@ -41,13 +41,6 @@ def commands() -> list[str]:
 def is_slow(command: str) -> bool:
     words = shlex.split(command)
     return any(word in SLOW for word in words)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("examples")
-    assert all(file.is_file() for file in write("all", made))
-    return made
 
 
 def run(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

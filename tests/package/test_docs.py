@@ -13,24 +13,45 @@ import udd
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-def test_the_reference_holds_every_public_name() -> None:
-    told = "\n".join(path.read_text(encoding="utf-8") for path in (DOCS / "api").glob("*.md"))
-    described = set(re.findall(r"auto(?:class|function|exception):: udd\.(\w+)\n", told))
-    wanted = {name for name in udd.__all__ if not inspect.ismodule(getattr(udd, name))}
-    assert wanted - described == set()
+def reference(pages: str = "*") -> set[str]:
+    """Return the names that pages of the reference list, each of which gets a page."""
+    text = "\n".join(path.read_text(encoding="utf-8") for path in (DOCS / "api").glob(f"{pages}.md"))
+    return set(re.findall(r"^   udd\.([\w.]+)$", text, re.MULTILINE))
+
+
+def test_the_reference_lists_every_public_name() -> None:
+    public = {name for name in udd.__all__ if not inspect.ismodule(getattr(udd, name))}
+    assert public - reference() == set()
 
 
 @pytest.mark.parametrize("module", ["related_systems", "plot"])
-def test_the_reference_holds_every_function_of(module: str) -> None:
-    told = (DOCS / "api" / f"{module}.md").read_text(encoding="utf-8")
-    described = set(re.findall(rf"autofunction:: udd\.{module}\.(\w+)\n", told))
-    assert described == set(getattr(udd, module).__all__)
+def test_the_reference_lists_every_function_of(module: str) -> None:
+    assert reference(module) == {f"{module}.{name}" for name in getattr(udd, module).__all__}
+
+
+def test_the_bibliography_lists_every_paper_that_the_code_cites() -> None:
+    bibliography = (DOCS / "references.md").read_text(encoding="utf-8")
+    entries = re.sub(r"\s+", " ", bibliography)
+    cited = set()
+    for path in [*(DOCS.parent / "python").rglob("*.py"), *(DOCS.parent / "rust").rglob("*.rs")]:
+        text = re.sub(r"\s+(//[/!]?\s+)?", " ", path.read_text(encoding="utf-8"))
+        cited |= set(re.findall(r"\b\d+ \((?:19|20)\d\d\) [A-Z]?\d+", text))
+        numbers = re.findall(r"(?:references?|refs?\.) \[(\d+)\]", text)
+        assert all(f"\n{number}. " in bibliography for number in numbers), path
+    assert len(cited) > 20
+    assert {work for work in cited if work not in entries} == set()
 
 
 def test_every_page_is_in_the_table_of_contents() -> None:
-    index = (DOCS / "index.md").read_text(encoding="utf-8")
-    for page in DOCS.glob("*.md"):
-        assert page.stem == "index" or f"\n{page.stem}\n" in index
+    listed: set[Path] = set()
+    for page in DOCS.rglob("*.md"):
+        trees = re.findall(
+            r"^```\{toctree\}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+        )
+        lines = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
+        listed |= {(page.parent / f"{line}.md").resolve() for line in lines}
+    written = {page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)}
+    assert written - listed == {DOCS / "index.md"}
 
 
 def test_the_gallery_has_every_plot_function() -> None:
