@@ -2,7 +2,7 @@
 
     python benches/count.py [--update]
 
-Fails where a path takes over 3 % more than `counts.json` says for this compiler; `--update` writes it anew.
+Fails if a path takes over 3 % more than `counts.json` has for this compiler; `--update` writes the file.
 The paths are those of `paths.rs`, with AVX2, run one by one under valgrind's callgrind.
 """
 

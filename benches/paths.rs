@@ -1,5 +1,5 @@
-//! The core's hot paths: timed by criterion, run once for `count.py` to count their instructions, or with `--limit` set
-//! beside what the machine could do at most.
+//! The core's hot paths: timed by criterion, run once for `count.py` to count their instructions, or with `--limit`
+//! compared with the limit of the machine.
 
 #[path = "paths/limit.rs"]
 mod limit;
@@ -69,7 +69,7 @@ fn starts(n: u32) -> Vec<[f64; 3]> {
     (0..n).map(|i| [spread(i, 0.618_034), spread(i, 0.414_214), spread(i, 0.732_051)]).collect()
 }
 
-/// What the steps of the built-in series are counted from.
+/// Runs whose steps of the built-in series are counted.
 fn series(values: Vec<Vec<f64>>, starts: Vec<[f64; 3]>, rtol: f64, derivatives: usize, time: f64) -> Steps {
     Steps { values, starts, tolerance: tolerance(rtol), derivatives, time }
 }
@@ -238,7 +238,7 @@ fn paths() -> Vec<Path> {
     ]
 }
 
-/// What callgrind is told to count.
+/// The function that callgrind counts.
 #[inline(never)]
 fn counted(work: &dyn Fn(Isa)) {
     work(Isa::Avx2);

@@ -14,8 +14,8 @@
 //!
 //! (the pairs of a square are `(k + 1)/2` products, its middle one among them, and one sum is left where two run side by
 //! side), so that the limit is `peak lanes / (instructions a step * steps a time unit)`, with the lanes of a register
-//! where many trajectories run side by side, and 1 where one runs alone. What else a step takes (its size, its end,
-//! events, tangents made orthonormal) is the distance from it, and so is waiting for results.
+//! where many trajectories run side by side, and 1 where one runs alone. The other parts of a step (its size, its end,
+//! events, orthonormal tangents) are the distance from the limit, and so is the waiting time for results.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -25,7 +25,7 @@ use udd::integrate::{ErrorNorm, Integrator, Taylor, Tolerance, WithTangents, ord
 use udd::model::{DleFamily, Family};
 use udd::scalar::{Dual, InstructionSet, Isa, Packet, Scalar, Work};
 
-/// What the steps of a path are counted from.
+/// Counts of the steps of a path.
 pub struct Steps {
     pub values: Vec<Vec<f64>>,
     pub starts: Vec<[f64; 3]>,

@@ -31,7 +31,7 @@ def row(what: str, value: float, known: Decimal, bound: float) -> float:
 
 
 def periods() -> list[float]:
-    """Of the symmetric cycle of the DLE."""
+    """Compare periods of the symmetric cycle of the DLE."""
     found = []
     for w in (7.1, 7.5, 8.0, 9.0, 10.0, 12.0, 15.0, 20.0, 30.0, 50.0, 70.0, 100.0):
         orbit = udd.periodic_orbit(udd.DLE(w))
@@ -40,7 +40,7 @@ def periods() -> list[float]:
 
 
 def hopf_points() -> list[float]:
-    """Of the rotating states of the damped equations: w = (1 - B)/(B (1 + B)), frequency sqrt((1 - B)/B)."""
+    """Compare Hopf points of the damped equations: w = (1 - B)/(B (1 + B)), frequency sqrt((1 - B)/B)."""
     found = []
     for B in (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9):
         b = Fraction(B)
@@ -57,7 +57,7 @@ def hopf_points() -> list[float]:
 
 
 def special_points() -> list[float]:
-    """Of two conditions: cusps, Bogdanov-Takens and Bautin points with closed forms."""
+    """Compare points of codimension two: cusps, Bogdanov-Takens and Bautin points with closed forms."""
     found = []
     for p2 in (10.0, 12.0, 14.0, 18.0, 20.0):
         # A -> B in a stirred reactor: v = 2 and u = 1/2 at the cusp.
@@ -94,7 +94,7 @@ def special_points() -> list[float]:
 
 
 def ends_of_branches() -> list[float]:
-    """Of Hopf points and pitchforks at which branches end, a fold of cycles and a saddle-node on a circle."""
+    """Compare ends of branches: Hopf points, pitchforks, a fold of cycles, a saddle-node on a circle."""
     found = []
     pitchfork, fifth = 0.6, 0.7  # as floats, which the models have
     for A in (0.8, 1.0, 1.3):
@@ -126,7 +126,7 @@ def ends_of_branches() -> list[float]:
 
 
 def numbers_of_solutions() -> list[float]:
-    """Of multipliers and first Lyapunov coefficients."""
+    """Compare multipliers and first Lyapunov coefficients."""
     found = []
     radial = "(1 - x^2 - y^2)"
     model = udd.Model(["x", "y", "u"], [f"x*{radial} - y", f"y*{radial} + x", "-0.3*u + x*(x^2 + y^2 - 1)"])
@@ -144,7 +144,7 @@ def numbers_of_solutions() -> list[float]:
 
 
 def homoclinic_orbits() -> list[float]:
-    """Of the saddle at z = 1/B, at the end of the cycles that the Hopf point gives rise to."""
+    """Compare the homoclinic orbits of the saddle at z = 1/B, which end the cycles born at the Hopf point."""
     found = []
     for B in (0.15, 0.2, 0.3):
         rests = udd.equilibria(udd.DLE(2.5, B=B))

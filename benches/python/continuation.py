@@ -1,4 +1,4 @@
-"""The figure-eight of the DLE from w = 10 down to w = 5: udd beside what else installs from PyPI.
+"""The figure-eight of the DLE from w = 10 down to w = 5: udd and other packages from PyPI.
 
 Prints for each the time, the points, the error of the period at w = 7.1, and where the symmetry breaks.
 """
@@ -46,7 +46,7 @@ def first_orbit(n: int) -> tuple[np.ndarray, float]:
 
 
 def by_solve_bvp() -> None:
-    """What a user writes with SciPy: collocation by solve_bvp at one value after the other."""
+    """Continue as a user of SciPy would: collocation by solve_bvp at one value after the other."""
     states, period = first_orbit(200)
     t, guess = np.linspace(0.0, 1.0, 201), np.column_stack([states, states[:, 0]])
     found = {}

@@ -287,7 +287,7 @@ def cases(seed: int, count: int, only: str = "") -> Iterator[tuple[str, Case]]:
 
 
 def faults(case: Case) -> list[str]:
-    """What is wrong with udd's answers, each in a few words."""
+    """List the errors in udd's answers, each in a few words."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if case.times is not None:

@@ -1,7 +1,7 @@
 """How long a fit takes: `python fit.py` prints the time of fits of simulated films on one core.
 
-Each record is a film of a chaotic disk with a camera's defects, as the tests take them; the time is the best
-of several turns, in CPU seconds, and beside it stand how far the parameters are from the truth.
+Each record is a film of a chaotic disk with a camera's defects, as in the tests. The time is the best of
+several turns, in CPU seconds, with the distance of the parameters from the truth.
 """
 
 from __future__ import annotations

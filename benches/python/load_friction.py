@@ -1,7 +1,7 @@
 """Could a film tell friction that depends on the load from the relaxation of the rolling constraint?
 
 Records are simulated with one of the two and fitted with each, the camera free. The difference in log
-evidence says which is preferred; below 2 (two standard deviations) they are not told apart.
+evidence gives the preferred one; below 2 (two standard deviations) they cannot be distinguished.
 
     python load_friction.py 4        four records of each kind
 """

@@ -1,7 +1,7 @@
 """Work and precision of the methods: `python methods.py` prints the table behind ``method="auto"``.
 
-Each model is run by each method at several tolerances; the error is that of the state at the end against a
-run at rtol = 1e-14, the median over starts, relative to the size of the motion.
+Each model is run by each method at several tolerances. The error is that of the state at the end, compared
+with a run at rtol = 1e-14: the median over starts, relative to the size of the motion.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the analyses of structure say of models of one's own, how long they take, and against which value.
+"""Apply the analyses of structure to text models: values, times, and reference values.
 
 Published values where there are such, else those of SciPy's integrators with Newton's method.
 """
@@ -27,7 +27,7 @@ def row(what: str, seconds: float, value: float, against: float, source: str) ->
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What the work gives, and how long it takes."""
+    """Return the result of the work and its time."""
     start = time.perf_counter()
     return work(), time.perf_counter() - start
 

@@ -71,7 +71,7 @@ def larger() -> list[tuple[str, udd.Model, np.ndarray, np.ndarray, set[str]]]:
         # Two frequencies without a common measure.
         ("four, a torus", two, np.zeros(4), np.full(4, 2.0), {"torus"}),
         ("five, chaos", five, np.array([0, 0, 25.0, 0, 0]), np.array([10, 10, 10, 2, 2.0]), {"chaos"}),
-        # Beside the cycle there is a stable torus, with two exponents zero.
+        # A stable torus coexists with the cycle; it has two exponents zero.
         ("six, cycle or torus", six, np.zeros(6), np.full(6, 2.0), {"periodic orbit", "torus"}),
     ]
 

@@ -16,7 +16,7 @@ _SHUTTER = 9  # looks during an exposure
 
 @dataclass(frozen=True)
 class Camera:
-    """What a camera gets wrong: lengths in m, angles in rad, times in s."""
+    """Faults of a camera: lengths in m, angles in rad, times in s."""
 
     noise: float = 5e-4
     angle_noise: float = 0.01

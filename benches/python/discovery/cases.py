@@ -18,16 +18,16 @@ from units import TRAIN, assumed, threshold
 import udd
 
 DRIVES = (0.016, 0.083)  # m/s
-_ROUNDS = 8  # of bringing a law to its multiple of the limit, from another start each
-_CLOSE = 0.1  # how near the multiple must come where it is prescribed
-_NEAR = 0.3  # and where it was drawn: what it came to is kept beside it
+_ROUNDS = 8  # to scale a law to its multiple of the limit, each from another start
+_CLOSE = 0.1  # tolerance of a prescribed multiple
+_NEAR = 0.3  # tolerance of a drawn multiple; the record keeps the real one
 _DRAWS = 40
 _EASED = 8  # draws after which strong laws are drawn weaker, within their range
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is to be drawn: the kinds of the laws, and their multiples of the detection limit."""
+    """A case to draw: the kinds of the laws, and their multiples of the detection limit."""
 
     batch: str
     names: tuple[str, ...]
@@ -43,13 +43,13 @@ class Case:
         return " + ".join(self.names) or f"null ({self.defect})"
 
     def generator(self, seed: int) -> np.random.Generator:
-        """What everything of it is drawn from."""
+        """Return the generator of all random numbers of a record."""
         return np.random.default_rng([seed, zlib.crc32(f"{self.batch} {self.title}".encode()), self.number])
 
 
 @dataclass(frozen=True)
 class Record:
-    """What was drawn: the truth, and what the camera saw of it."""
+    """A drawn record: the truth, and its observation by the camera."""
 
     world: World
     motion: Run

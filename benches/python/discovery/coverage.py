@@ -29,7 +29,7 @@ DURATION = 120.0
 
 
 def truth(record: Record) -> dict[str, float]:
-    """What the fit's parameters should come to."""
+    """Return the true values of the fit's parameters."""
     device, camera = record.world.device, record.camera
     return {
         **{name: float(getattr(device, name)) for name in ("k0", "k1", "k2", "W")},

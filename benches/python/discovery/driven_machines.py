@@ -39,7 +39,7 @@ def waves(
 
 
 def slow(values: np.ndarray, step: float, lag: float) -> np.ndarray:
-    """What a sensor of first order makes of samples."""
+    """Filter samples by a sensor of first order."""
     keep = np.exp(-step / lag)
     return np.asarray(lfilter([1 - keep], [1, -keep], values, zi=[keep * values[0]])[0])
 

@@ -1,4 +1,4 @@
-"""What a record can tell of a law at best, when states, device and camera are unknown too.
+"""Compute the information of a record about a law if states, device and camera are unknown.
 
 The information of the Cramer-Rao bound for the assumed model error, computed at the truth and without udd:
 linearised flows from one frame to the next, and one sparse solve. It gives an effect's detection limit: the
@@ -24,7 +24,7 @@ DEVICE = ("k0", "k1", "k2", "W")
 
 @dataclass(frozen=True)
 class Assumed:
-    """What a fit assumes: model error per square root of a second, and what is known beforehand."""
+    """Assumptions of a fit: model error per square root of a second, and priors."""
 
     diffusion: tuple[float, ...]
     device: dict[str, float]

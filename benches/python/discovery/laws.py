@@ -16,7 +16,7 @@ EPS = 0.05  # rad/s over which dry friction's sign is smoothed
 
 
 class Push(NamedTuple):
-    """What a law adds."""
+    """Contributions of a law."""
 
     u: Any = 0.0
     w: Any = 0.0
@@ -25,7 +25,7 @@ class Push(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What a law may look at: the device, the time, the state."""
+    """Arguments of a law: the device, the time, the state."""
 
     device: Any
     t: Any
@@ -229,7 +229,7 @@ FOREIGN = {
     )
 }
 
-#: Effects that no library holds and that were seen to lead the fit of the plain model far astray.
+#: Effects outside every library with which the fit of the plain model converged to a wrong solution.
 ASTRAY = {
     kind.name: kind
     for kind in (

@@ -8,9 +8,9 @@ rho = 28, beta = 8/3 from (-8, 8, 27), a sample every 0.01, length/0.01 samples 
 white Gaussian noise, the same on all three states: a share of the standard deviation of all numbers of the
 clean record of length 10 taken together, 12.75 (the script's first version took their root mean square,
 15.99: `--unit rms`). The library is the ten monomials up to the second degree in each equation. A record is
-recovered if exactly the seven true terms of the 30 remain. ODR-BINDy is told the noise's standard deviation.
+recovered if exactly the seven true terms of the 30 remain. ODR-BINDy uses the noise's standard deviation.
 
-What recovers is a function of the times (n,) and the noisy states (n, 3) that returns coefficients (10, 3).
+A method is a function of the times (n,) and the noisy states (n, 3) that returns coefficients (10, 3).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ UNITS: dict[str, Callable[[np.ndarray], float]] = {
 }
 
 #: ODR-BINDy's share of records recovered by length, then noise, from the colours of the paper's Fig. 4
-#: (+-0.02), as github.com/jamestr4n/odr-bindy-julia read them; that port itself recovers 64, 64 and 62 of 64
+#: (+-0.02), as github.com/jamestr4n/odr-bindy-julia read them. That port itself recovers 64, 64 and 62 of 64
 #: at length 10 with noise 0.1, 0.2, 0.3.
 PUBLISHED = {
     4: {0.1: 1.00, 0.15: 0.96, 0.2: 0.54, 0.25: 0.32, 0.3: 0.15, 0.35: 0.04, 0.4: 0.04},

@@ -1,4 +1,4 @@
-"""What came of machines' records, and the table of it."""
+"""Results of machines' records, and their table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from machines import MachineCase, drawn
 
 import udd
 
-#: What an effect's name in the answer may be for each kind of missing term.
+#: Names that the answer may use for each kind of missing term.
 _MEANS = {
     "dry": r"coulomb|stribeck|dry_.*|tanh_.*",
     "viscous": r"[vw]_in_[vw]|.*viscous.*",
@@ -34,7 +34,7 @@ _MEANS = {
 
 @dataclass
 class MachineScore:
-    """What came of a record."""
+    """Result of a record."""
 
     title: str
     number: int
@@ -43,8 +43,8 @@ class MachineScore:
     verdict: str = ""
     found: list[str] = field(default_factory=list)
     alternatives: list[str] = field(default_factory=list)
-    right: bool = False  # what was found is what is missing, each by name
-    in_class: bool = False  # or is named as one that the data cannot tell apart
+    right: bool = False  # the effects are the missing terms, each by name
+    in_class: bool = False  # or a named form that the data cannot distinguish
     before: float = np.nan
     after: float = np.nan
     low: float = np.nan
@@ -56,7 +56,7 @@ class MachineScore:
     error: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the result as JSON."""
         return asdict(self)
 
 

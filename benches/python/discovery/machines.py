@@ -24,7 +24,7 @@ OPTIONS = ("default", "harmless", "sigma")
 
 @dataclass(frozen=True)
 class Sensor:
-    """What reads a coordinate.
+    """A sensor of a coordinate.
 
     Attributes
     ----------
@@ -45,11 +45,11 @@ class Sensor:
 
     @property
     def sigma(self) -> float:
-        """What its data sheet would say."""
+        """Return the standard deviation that its data sheet would give."""
         return float(np.hypot(self.noise, self.step / np.sqrt(12)))
 
     def read(self, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """What it makes of a coordinate."""
+        """Return its readings of a coordinate."""
         white = rng.standard_normal(len(x))
         own = np.empty(len(x))
         own[0] = white[0]
@@ -235,7 +235,7 @@ def track(lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> M
 
 
 def phone(_lacks: tuple[str, ...], _encoder: bool, rng: np.random.Generator) -> Machine:
-    """A phone on a spring that reads its own motion, slightly bent: harmonics that are the sensor's."""
+    """A phone on a spring that reads its own motion, with a slight nonlinearity: harmonics of the sensor."""
     w, damping = 2 * np.pi * rng.uniform(0.6, 0.9), rng.uniform(0.01, 0.03)
     t = np.arange(0, 40, 1 / 50)
     x = one_degree(lambda _t, x, v: -(w**2) * x - damping * v, 0.0, rng.uniform(0.5, 1.5), 0.0, t)
@@ -264,7 +264,7 @@ def one_degree(
 ) -> np.ndarray:
     """The coordinate of ``x'' = smooth(t, x, x') - dry sign(x')`` at times t.
 
-    A body that dry friction holds once is held for good: with it `smooth` must not depend on the time.
+    A body that dry friction stops once stays at rest: then `smooth` must not depend on the time.
     """
     result, now = np.empty(len(t)), float(t[0])
     while True:
@@ -308,7 +308,7 @@ _PENDULUMS = {
     for lacks in (*_FRICTIONS, ())
     for encoder in (True, False)
 }
-#: What draws a machine, what it lacks, and whether an encoder reads it.
+#: A function that draws a machine, its missing terms, and True if an encoder reads it.
 Kind = tuple[Callable[..., Machine], tuple[str, ...], bool]
 KINDS: dict[str, Kind] = _PENDULUMS | {
     "slider: dry": (slider, ("dry",), False),
@@ -338,7 +338,7 @@ class MachineCase:
 
     @property
     def label(self) -> str:
-        """What it is chosen by."""
+        """Return the name for `--only`."""
         return f"{self.title}; {self.options}"
 
 

@@ -1,4 +1,4 @@
-"""What the truth itself would score: the true law and the true constants, from the same frames.
+"""Score the truth: the true law and the true constants, from the same frames.
 
 Where udd can hold the law, its own filter starts the free runs, so that only the model differs. Where it
 cannot, the state at each start is fitted to the same second of data by Gauss and Newton over the true flow,
@@ -90,7 +90,7 @@ def _run(drawn: Record, x: np.ndarray, t: np.ndarray, frames: np.ndarray) -> np.
 
 
 def _look(drawn: Record, states: np.ndarray) -> np.ndarray:
-    """What the camera would see of states without noise, to first order in its times."""
+    """Return the camera's view of states without noise, to first order in its times."""
     camera, w = drawn.camera, drawn.world.device.W
     omega, y, z, beta = np.moveaxis(states, -1, 0)
     late = -camera.row * z

@@ -3,8 +3,8 @@
     python benches/python/discovery/pysindy_disk.py [--records 20] [--seed 20261121] [--defects]
 
 Records of a minute at 25 Hz with noise of 0.5 mm and 0.01 rad, drives and starts drawn: with nothing hidden,
-and with a relaxation of the rolling constraint of 5 /m. Unlike udd it is told W, k0, k1, k2, and its settings
-are chosen on other records whose truth is known.
+and with a relaxation of the rolling constraint of 5 /m. Unlike udd it gets W, k0, k1, k2, and its settings
+are chosen on other records with a known truth.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ HIDDEN: dict[str, tuple[Law, ...]] = {
 
 @dataclass(frozen=True)
 class Record:
-    """What was filmed, and what was hidden in it."""
+    """A filmed run, and its hidden effect."""
 
     device: Device
     hidden: str

@@ -1,9 +1,8 @@
 """PySINDy (2.1) as a peer, on Lorenz63 and on the disk.
 
-It is used as its authors use it on noisy data: smoothed derivatives or the weak form, an ensemble of
-bootstrapped sparse regressions of which a term survives that is in 60 % of them. What it has to be told,
-thresholds and windows, is chosen where it is called, on other records whose truth is known: more than a user
-could do.
+It is used as its authors use it on noisy data: with smoothed derivatives or the weak form, and an ensemble of
+bootstrapped sparse regressions. A term survives if it is in 60 % of them. The caller chooses thresholds and
+windows on other records with a known truth, which a user could not do.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ DOMAINS = 300  # of the weak form; a few hundred per thousand samples
 
 @dataclass(frozen=True)
 class Settings:
-    """What PySINDy has to be told.
+    """Settings of PySINDy.
 
     `weak` is the half-width of the test functions, 0 for pointwise derivatives; `smooth` the window of a
     Savitzky-Golay filter of the third degree in samples, 0 for none; `constant` whether the library has one.
@@ -47,7 +46,7 @@ def _grid(weak: tuple[float, ...], smooth: tuple[int, ...], **more: Any) -> list
     return [Settings(t, w, s, **more) for t, w, s in itertools.product(thresholds, weak, smooth)]
 
 
-#: Families of settings; without a constant, it is told more than the protocol tells.
+#: Families of settings; without a constant, it has more knowledge than the protocol allows.
 GRIDS = {
     "pointwise ensemble": _grid((0.0,), (11, 21, 31), models=MODELS),
     "weak": _grid((0.2, 0.4), (0, 21)),

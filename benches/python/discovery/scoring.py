@@ -21,7 +21,7 @@ _DEVICE = ("k0", "k1", "k2", "W")
 
 @dataclass
 class Score:
-    """What came of a record."""
+    """Result of a record."""
 
     batch: str
     title: str
@@ -34,8 +34,8 @@ class Score:
     alternatives: list[str] = field(default_factory=list)
     equations: list[bool] = field(default_factory=list)
     forms: list[bool] = field(default_factory=list)
-    named: list[bool] = field(default_factory=list)  # the truth was chosen, not only named beside the choice
-    false: int = 0  # effects reported that are none of the truth's, nor may stand for one
+    named: list[bool] = field(default_factory=list)  # the truth was chosen, not only listed as an alternative
+    false: int = 0  # reported effects that are neither in the truth nor equivalent to one
     z: dict[str, float] = field(default_factory=dict)
     z_device: dict[str, float] = field(default_factory=dict)
     horizons: list[float] = field(default_factory=list)
@@ -50,7 +50,7 @@ class Score:
     error: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the result as JSON."""
         return asdict(self)
 
 
@@ -115,7 +115,7 @@ def _judge(result: Score, drawn: Record, found: udd.Discovery) -> None:
 
 
 def _otherwise(found: udd.Discovery, law: Law) -> set[str]:
-    """What else the law may be called: the wheel's ripple is one of the drive at that frequency."""
+    """Return other names of the law: the wheel's ripple is one of the drive at that frequency."""
     if law.kind.name != "wheel_ripple":
         return set()
     turns = found.fit.parameters["W"] / (2 * np.pi * law.shape["r"])

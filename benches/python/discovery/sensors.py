@@ -128,7 +128,7 @@ def _solved(rates: Callable[[float, np.ndarray], list[float]], start: list[float
 
 
 def _slow(motion: Motion, t: np.ndarray, length: float, constant: float) -> np.ndarray:
-    """What a sensor of first order with a time constant shows of a motion."""
+    """Filter a motion by a sensor of first order with a time constant."""
     fine = np.arange(0, length, 1 / _FINE)
     share = np.exp(-1 / (_FINE * constant))
     x = motion(fine)

@@ -20,7 +20,7 @@ def library() -> udd.Model:
 
 
 def prune(t: np.ndarray, noisy: np.ndarray) -> np.ndarray:
-    """Coefficients (10, 3); unlike ODR-BINDy it is not told the noise."""
+    """Coefficients (10, 3); unlike ODR-BINDy it does not get the noise."""
     measured = udd.Measurement(t, dict(zip(STATES, noisy.T, strict=True)))
     try:
         found = udd.prune(measured, library(), spread=SPREAD)

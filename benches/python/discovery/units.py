@@ -1,4 +1,4 @@
-"""What the benchmark takes from udd: what its fit assumes, how many candidates it looks at, its threshold."""
+"""Quantities of udd that the benchmark uses: assumptions of a fit, number of candidates, threshold."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["TRAIN", "assumed", "threshold"]
 
 
 def assumed(model: udd.Disk) -> Assumed:
-    """What a search assumes of the model at its tightest."""
+    """Return the smallest model error of a search."""
     fit, sensor = model.profile.fit, model.profile.sensor
     device = {name: fit.priors[name] * model.parameters[name] for name in DEVICE}
     level = levels(model.kind)[: fit.searched][-1]

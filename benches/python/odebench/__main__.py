@@ -9,8 +9,8 @@ share of each state's standard deviation). Questions:
 
 missing   a term, drawn from all terms, is taken out of the known model, and each constant of the rest starts
           at 0.8 to 1.25 times its value: does `udd.discover` name that term? All states are seen.
-hidden    the same, but a state, drawn too, is not seen; udd is told where it starts.
-library   nothing is known but a library of terms: does `udd.prune` leave the true ones?
+hidden    the same, but a drawn state is not observed; udd gets its start.
+library   only a library of terms is given: does `udd.prune` leave the true ones?
 pysindy   the same question to PySINDy with its defaults; in an environment that has it, which needs no udd.
 
 The truth is computed without udd; all draws are from seeds that were fixed before the first run.
@@ -67,7 +67,7 @@ def main() -> int:
     parser.add_argument("--systems", help="numbers and ranges, as in 1-23,54")
     parser.add_argument("--noise", type=float, nargs="+", default=[0.0, 0.01, 0.05, 0.1])
     parser.add_argument("--additive", action="store_true", help="noise of a share of the standard deviation")
-    parser.add_argument("--told", action="store_true", help="udd is told each sample's standard deviation")
+    parser.add_argument("--told", action="store_true", help="give udd the standard deviation of each sample")
     parser.add_argument("--only", default="missing,hidden,library", help=f"of {', '.join(QUESTIONS)}")
     parser.add_argument("--draw", type=int, default=0, help="the number of the noise's draw")
     parser.add_argument("--spread", type=float, help="for udd.prune: of the factors' prior")

@@ -7,8 +7,8 @@ digits, angles between -pi and pi. A record lasts five periods; the other start 
 larger.
 
 A line of the table below is a name, the period, the start; then the shapes and the states that are angles,
-where there are any. Under it stands every state's rate. A factor without a decimal point stands in the
-equation as such; any other is a constant.
+where there are any. Under it stands every state's rate. A factor without a decimal point is a number of the
+equation; any other is a constant.
 """
 
 from __future__ import annotations

@@ -19,12 +19,12 @@ from systems import System
 
 @dataclass
 class Library:
-    """What came of a record of which nothing was known but a library.
+    """Result of a record with a library as the only knowledge.
 
     `outcome` is "recovered" (exactly the true terms), "more" (these and others), "fewer" (some of these),
-    "wrong", "refused" or "failed"; where the library does not hold every true term, "fits" or "wrong" by
-    whether R2 from the other start exceeds 0.9. `missed` and `extra` count terms, `undetermined` those that
-    are said not to be determined by the record beside others.
+    "wrong", "refused" or "failed". If the library lacks a true term it is "fits" if R2
+    from the other start exceeds 0.9, or "wrong". `missed` and `extra` count terms, `undetermined` those that
+    the record does not determine together with others.
     """
 
     method: str
@@ -43,7 +43,7 @@ class Library:
     error: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the result as JSON."""
         return {"question": self.method, **asdict(self)}
 
 

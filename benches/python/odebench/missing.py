@@ -17,12 +17,12 @@ _SAME = 1e-6  # of the added rates' size: what differs by so little is the same 
 
 @dataclass
 class Missing:
-    """What came of a record whose model lacks a term.
+    """Result of a record whose model lacks a term.
 
     Attributes
     ----------
     term : str
-        What was taken out.
+        The removed term.
     listed : bool
         Whether the library of `udd.discover` holds its form.
     outcome : str
@@ -61,7 +61,7 @@ class Missing:
     error: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the result as JSON."""
         return {"question": "missing", **asdict(self)}
 
 
@@ -129,7 +129,7 @@ def search(record: Record, noise: float) -> Missing:
 
 
 def _added(model: udd.Model, effects: list[Any], points: np.ndarray) -> np.ndarray:
-    """What effects add to the rates."""
+    """Return the contribution of effects to the rates."""
     values = dict(model.values)
     plain = udd.Model(list(model.state_names), model.texts, values, angles=list(model.angles))
     return plain.with_effects(effects).rates(0.0, points) - plain.rates(0.0, points)
@@ -177,7 +177,7 @@ def _judge(
 
 
 def _unit(model: udd.Model, effect: Any, points: np.ndarray) -> np.ndarray:
-    """What a candidate adds to the rates with its amplitudes at 1."""
+    """Return the contribution of a candidate to the rates with its amplitudes at 1."""
     values = {
         p.name: 1.0 if p.role == "amplitude" else effect.parameters[p.name] for p in effect.spec.parameters
     }

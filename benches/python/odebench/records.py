@@ -1,6 +1,6 @@
 """Records of ODEBench's systems: SciPy's motion, noise, states that were not seen; their errors elsewhere.
 
-What is true is evaluated by NumPy from the table: no code is shared with udd.
+NumPy evaluates the truth from the table: no code is shared with udd.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _solved(
 
 @dataclass(frozen=True)
 class Record:
-    """What was measured: a column for each state, those of `seen` only were looked at.
+    """A measured record: a column for each state, of which `seen` lists the observed ones.
 
     `told` is the noise's standard deviation in every sample, where a method may know it.
     """
@@ -117,7 +117,7 @@ class Record:
 
     @property
     def sigma(self) -> dict[str, Array] | None:
-        """The standard deviations of these, where they are told."""
+        """Return the standard deviations of these, if they are given."""
         return None if self.told is None else self._seen(self.told)
 
     def _seen(self, table: Array) -> dict[str, Array]:
@@ -155,8 +155,8 @@ def record(
     """A record from the system's first start.
 
     Noise is white: multiplicative as ODEFormer's authors have it, x (1 + noise N(0, 1)), or, additive, a
-    share of each state's standard deviation. `number` draws it anew. Of a record with a hidden state, which
-    is drawn, all others are seen.
+    share of each state's standard deviation. `number` draws another one. In a record with a hidden state,
+    which is drawn, all others are observed.
     """
     t = np.linspace(0.0, system.last, SAMPLES)
     clean = motion(system, system.starts[0], t)
@@ -167,6 +167,6 @@ def record(
     seen = list(system.states)
     if hidden:
         seen.pop(int(np.random.default_rng([SEED, system.number, 1]).integers(len(seen))))
-    # No sample is exact: where a state goes through zero it is told as known to a thousandth of its size.
+    # No sample is exact: the error of a state near zero is a thousandth of its size.
     least = np.maximum(size, noise * 1e-3 * clean.std(axis=0))
     return Record(system, t, clean, clean + size * drawn, tuple(seen), least if told and noise else None)

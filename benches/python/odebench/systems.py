@@ -2,7 +2,7 @@
 
 The equations, constants and starts are those of `odeformer/odebench/strogatz_equations.py` in
 github.com/sdascoli/odeformer, products multiplied out. A term is a factor and a function of the states. A
-factor that is a whole number stands in the equation as such; any other is a constant, and so are the shapes,
+factor that is a whole number is a number of the equation; any other is a constant, and so are the shapes,
 the numbers inside of functions.
 """
 

@@ -1,4 +1,4 @@
-"""What is timed and compared: rows of entries, interleaved."""
+"""Rows of entries, which are timed and compared in turns."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Row:
 
 @dataclass
 class Result:
-    """What a row's entry did."""
+    """Result of an entry of a row."""
 
     name: str
     entry: Entry | None

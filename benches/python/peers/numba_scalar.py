@@ -98,7 +98,7 @@ ONE = int(np.float64(1.0).view(np.int64))
 
 @njit(forceinline=True, **FAST)
 def factor(err2: float) -> float:
-    """By how much the next step is longer, before limits: 0.9 err^(-1/8).
+    """Return the ratio of the next step to this one, before limits: 0.9 err^(-1/8).
 
     A float's bits are its logarithm, nearly: the root is a shift, good to half a percent, and a step's length
     needs no more. It vectorises and takes a cycle where four square roots take a hundred.

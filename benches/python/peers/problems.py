@@ -1,8 +1,8 @@
 """The work all codes do, and tight references for it from SciPy.
 
-The accuracy of a code is what its own run leaves at the end of a moderate span (t = 30 at w = 1, where
-neighbouring orbits have parted by a factor of about 500): the median over starts of the largest error of a
-component. Where two codes are compared both have met the row's bound.
+The accuracy of a code is its error at the end of a moderate span (t = 30 at w = 1, where neighbouring orbits
+have separated by a factor of about 500): the median over starts of the largest error of a component. Two
+codes are compared only if both meet the bound of the row.
 """
 
 from __future__ import annotations

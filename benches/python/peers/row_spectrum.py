@@ -1,7 +1,7 @@
 """The full Lyapunov spectrum at w = 1, one trajectory at rtol 1e-9, one thread.
 
-The error of a step is that of the state, where a code can be told so: with it the exponents over t = 30 are
-good to 5e-9.
+The error of a step is that of the state, if a code has such an option: then the exponents over t = 30 are
+accurate to 5e-9.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ BOUND = 1.2e-7  # what DOP853 at rtol 1e-9 leaves at t = 30
 
 
 def bounded(flow: Flow) -> Callable[[Any], str]:
-    """What is wrong with a state at the end."""
+    """Return the error of a state at the end."""
 
     def inspect(answer: Any) -> str:
         state = np.asarray(answer)

@@ -30,7 +30,7 @@ def standing(row: Row, results: list[Result]) -> tuple[str, str, str]:
 def limits(text: str) -> dict[str, float]:
     """The rates that one core could reach at most, from what ``make bench ARGS=--limit`` printed.
 
-    Of the instruction sets the last one is kept, which is the widest.
+    The last instruction set is kept, which is the widest.
     """
     lines = re.findall(r"^(.*), Avx\w+ +\S+ +(\S+) +\d+ %$", text, re.MULTILINE)
     return {path: float(most) for path, most in lines}

@@ -46,7 +46,7 @@ def spectrum(rtol: float = 2.8e-8) -> tuple[str, Any]:
     model, row = udd.DLE(1.0), np.array([[1.0, 0.0]])
 
     def run(start: Any, t: float) -> Any:
-        # What udd.lyapunov_spectrum calls, for a given time without a transient.
+        # The call of udd.lyapunov_spectrum, for a given time without a transient.
         found = _core.lyapunov(Batch(model, row, start[None], rtol, 1e-3 * rtol), True, t, 0.0, 0.0)
         return found["value"][0], found["end"][0]
 
@@ -62,7 +62,7 @@ def sweep(rtol: float = 3.9e-5) -> tuple[str, Any]:
     model = udd.DLE(1.0)
 
     def run(w: Any, starts: Any, transient: float, t: float) -> Any:
-        # What udd.lyapunov calls, from given starts.
+        # The call of udd.lyapunov, from given starts.
         rows = np.column_stack([w, np.zeros(len(w))])
         batch = Batch(model, rows, starts, rtol, 1e-3 * rtol, threads=2)
         found = _core.lyapunov(batch, False, t, transient, 0.0)

@@ -4,9 +4,9 @@
 
 Films are made by the film maker with the seed (14 s, 550 x 700 pixels, 1750 per metre, W = 0.039 m/s, noise 2
 of 255, MPEG-4 as OpenCV writes it, exposure 10 ms, the support before the disk; each row says what differs),
-and kept in the folder. Nothing about them is told to udd but the disk's radius; the other trackers are told
-colours, scale and pivot. Errors are those of the table as it stands, "shape" those after a shift and a common
-factor; a row is wrong where it is off by 2 mm or 0.1 rad without a flag, or stands where no disk is.
+and kept in the folder. udd gets only the disk's radius; the other trackers get colours, scale
+and pivot. Errors are those of the table, "shape" those after a shift and a common factor. A row is wrong if
+it is off by 2 mm or 0.1 rad without a flag, or has a position without a disk.
 
 trackpy and CSRT, which OpenCV 5 has no longer, come from a folder of their own:
 

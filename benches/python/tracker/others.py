@@ -1,4 +1,4 @@
-"""What else one would pick: an OpenCV colour tracker, trackpy, OpenCV's CSRT. Told colours, scale and pivot.
+"""Other trackers: an OpenCV colour tracker, trackpy, OpenCV's CSRT. They get colours, scale and pivot.
 
 Each gives the marks' centres in a frame; one least-squares rigid fit makes Y, Z and beta of them.
 """

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Score:
-    """What one tracker made of one film."""
+    """Result of a tracker on a film."""
 
     length: float  # rms (or 95th percentile over 1.96) of Y or Z, the worse [mm]
     angle: float  # [mrad]
