@@ -238,12 +238,12 @@ class _Writer:
         name = type(value).__name__
         if not is_dataclass(value) or _TYPES.get(name) is not type(value):
             raise ModelError(f"a result with a {name} in it cannot be saved")
-        known = {one.name: self.value(getattr(value, one.name)) for one in fields(value)}
+        entries = {attribute.name: self.value(getattr(value, attribute.name)) for attribute in fields(value)}
         # Told of the fit before its errors were widened: it cannot be found again.
         more = (
             {"doubts": self.value(value.doubts)} if isinstance(value, Fit) and "doubts" in vars(value) else {}
         )
-        return {"type": name, "fields": known | more}
+        return {"type": name, "fields": entries | more}
 
 
 _hints = functools.cache(get_type_hints)

@@ -219,12 +219,12 @@ def _other_units(model: Disk) -> Iterator[OtherUnit]:
 
 def _drive_seen(t: Floats, values: Floats, seen: NDArray[np.bool_]) -> float:
     """The mean of dZ/dT + Y dbeta/dT, m/s: no fit is needed, and hardly an effect moves it."""
-    near = seen[1:] & seen[:-1]
-    if not near.any():
+    consecutive = seen[1:] & seen[:-1]
+    if not consecutive.any():
         return float("nan")
     y, z, beta = values.T
     lifted = np.diff(z) + 0.5 * (y[1:] + y[:-1]) * np.diff(beta)
-    return float(lifted[near].sum() / np.diff(t)[near].sum())
+    return float(lifted[consecutive].sum() / np.diff(t)[consecutive].sum())
 
 
 # --- what curves depend on

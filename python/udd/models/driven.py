@@ -111,14 +111,14 @@ def moved_pendulum(
     array([0., 2.])
     """
     size = number("length", length, above=0.0)
-    own = size * size if inertia is None else number("inertia", inertia, above=0.0)
+    moment = size * size if inertia is None else number("inertia", inertia, above=0.0)
     return FormulaModel(
         ["Omega", "theta"],
         {
             "Omega": "(-length*((g + az)*sin(theta) + ax*cos(theta)) - k0*Omega)/inertia",
             "theta": "Omega",
         },
-        {"length": size, "inertia": own, "g": g, "k0": k0},
+        {"length": size, "inertia": moment, "g": g, "k0": k0},
         angles=["theta"],
         inputs=["ax", "az"],
     )

@@ -298,20 +298,20 @@ class FormulaModel(Model):
         """
         if not self.mass:
             raise ModelError(f"a force along {along} needs the model's mass matrix: udd.Model(..., mass=...)")
-        known, (first, *rest) = list(self.speeds), (name.strip() for name in along.split(" - "))
+        speeds, (first, *rest) = list(self.speeds), (name.strip() for name in along.split(" - "))
         for name in (first, *rest):
-            if name not in known or len(rest) > 1 or name in rest[:-1] or [first] == rest:
+            if name not in speeds or len(rest) > 1 or name in rest[:-1] or [first] == rest:
                 between = (
-                    f' or between two of them, as in "force({known[1]} - {known[0]})"' if known[1:] else ""
+                    f' or between two of them, as in "force({speeds[1]} - {speeds[0]})"' if speeds[1:] else ""
                 )
                 raise ModelError(
-                    f"a force acts along one of {', '.join(known)}{between}, not along {along!r}"
+                    f"a force acts along one of {', '.join(speeds)}{between}, not along {along!r}"
                 )
-        n, whole = len(known), determinant(self.mass)
+        n, whole = len(speeds), determinant(self.mass)
         result = {}
         for i, speed in enumerate(self.speeds.values()):
-            parts = [cofactor(self.mass, known.index(first), i)]
-            parts += [f"({cofactor(self.mass, known.index(name), i)})" for name in rest]
+            parts = [cofactor(self.mass, speeds.index(first), i)]
+            parts += [f"({cofactor(self.mass, speeds.index(name), i)})" for name in rest]
             result[speed] = f"({' - '.join(parts)})/({whole})" if n > 1 else f"1/({whole})"
         return result
 
@@ -407,16 +407,16 @@ class FormulaModel(Model):
         array([0.5, 1.5])
         """
         checked = []
-        for own in records:
-            if unknown := next((name for name in own if name not in self.inputs), None):
+        for signals in records:
+            if unknown := next((name for name in signals if name not in self.inputs), None):
                 known = ", ".join(self.inputs) or "none"
                 raise ModelError(f"the model has no input {unknown!r}; it has {known}")
             for name in self.inputs:
-                if not isinstance(own.get(name), InputSignal):
+                if not isinstance(signals.get(name), InputSignal):
                     raise ModelError(
-                        f"the input {name} needs a signal (a udd.InputSignal), not {own.get(name)!r}"
+                        f"the input {name} needs a signal (a udd.InputSignal), not {signals.get(name)!r}"
                     )
-            checked.append(dict(own))
+            checked.append(dict(signals))
         if not 0 <= record < max(len(checked), 1):
             raise ModelError(f"there is no record {record} of the inputs: there are {len(checked)}")
         return self._with(records=tuple(checked) if self.inputs else (), record=record)
@@ -531,7 +531,7 @@ class FormulaModel(Model):
             An unknown name or an unusable value.
         """
         arguments = self._arguments()
-        own = {name: changes.pop(name) for name in list(changes) if name in self.parameters}
+        new_values = {name: changes.pop(name) for name in list(changes) if name in self.parameters}
         for name in changes:
             if name not in arguments:
                 known = ", ".join((*arguments, *self.parameters))
@@ -539,7 +539,7 @@ class FormulaModel(Model):
         new = FormulaModel(**(arguments | changes))
         if new.inputs == self.inputs:
             new = new._with(records=self.records, record=self.record)
-        return new.with_parameters(own) if own else new
+        return new.with_parameters(new_values) if new_values else new
 
     def __repr__(self) -> str:
         angles = f", angles={list(self.angles)!r}" if self.angles else ""
@@ -586,15 +586,15 @@ def _written(effect: Effect) -> str:
 
 def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> tuple[tuple[str, ...], ...]:
     """A mass matrix as text, checked at a few states."""
-    known = list(model.speeds)
-    if not known:
+    speeds = list(model.speeds)
+    if not speeds:
         raise ModelError("a mass matrix needs coordinates: states whose equation is another state")
     try:
         rows = [list(row) for row in given if not isinstance(row, str)]
     except TypeError:
         rows = []
-    if [len(row) for row in rows] != [len(known)] * len(known):
-        raise ModelError(f"mass must be a table with a row and a column for each of {', '.join(known)}")
+    if [len(row) for row in rows] != [len(speeds)] * len(speeds):
+        raise ModelError(f"mass must be a table with a row and a column for each of {', '.join(speeds)}")
     mass = tuple(tuple(text_of("the mass matrix", one) for one in row) for row in rows)
     held = model._with(mass=mass)
     # Numbers without a pattern, in which no formula is symmetric by accident.
@@ -630,13 +630,13 @@ def _turning(model: FormulaModel) -> tuple[str, ...]:
         still = InputSignal([0.0, 1.0], [0.0, 0.0])
         model = model.with_inputs(dict.fromkeys(model.inputs, still))
     start = np.sin(np.arange(1.0, len(model.state_names) + 1))
-    found = set()
+    turned_channels = set()
     for name in model.angles:
         turned = start + 2 * np.pi * (np.array(model.state_names) == name)
         with np.errstate(all="ignore"):  # where a formula has no value it shows no turn either
             moved = np.abs(model.observed(0.0, turned) - model.observed(0.0, start))
-        found |= {model.channels[k] for k in np.flatnonzero(np.abs(moved - 2 * np.pi) < 1e-9)}
-    return tuple(name for name in model.channels if name in found)
+        turned_channels |= {model.channels[k] for k in np.flatnonzero(np.abs(moved - 2 * np.pi) < 1e-9)}
+    return tuple(name for name in model.channels if name in turned_channels)
 
 
 def _delays(
@@ -692,7 +692,7 @@ def _equations(
 ) -> tuple[str, ...]:
     """The rates in the order of the states."""
     if isinstance(equations, Mapping):
-        given = {str(name): one for name, one in equations.items()}
+        given = {str(name): equation for name, equation in equations.items()}
         for name in names:
             if name not in given:
                 raise ModelError(f"the state {name} has no equation")
@@ -706,4 +706,6 @@ def _equations(
             raise ModelError(f"there are {len(names)} states but {len(listed)} equations")
     else:
         raise ModelError(f"equations must be a table or a list of formulas, not {equations!r}")
-    return tuple(text_of(f"the equation of {name}", one) for name, one in zip(names, listed, strict=True))
+    return tuple(
+        text_of(f"the equation of {name}", equation) for name, equation in zip(names, listed, strict=True)
+    )

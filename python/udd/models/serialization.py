@@ -30,7 +30,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         It would not come back the same.
     """
     if isinstance(model, FormulaModel):
-        own = {
+        entry = {
             "kind": _FORMULA,
             "states": list(model.state_names),
             "equations": model.equations,
@@ -39,14 +39,14 @@ def model_to_dict(model: Model) -> dict[str, Any]:
             "effects": [effect_to_dict(effect) for effect in model.effects],
         }
         if model.mass:
-            own["mass"] = [list(row) for row in model.mass]
+            entry["mass"] = [list(row) for row in model.mass]
         if model.inputs:
-            own["inputs"] = list(model.inputs)
+            entry["inputs"] = list(model.inputs)
         if model.delays:
-            own["delays"] = dict(model.delays)
+            entry["delays"] = dict(model.delays)
         if model.observe:
-            own["observe"] = dict(model.observe)
-        return own
+            entry["observe"] = dict(model.observe)
+        return entry
     cls = type(model)
     result: dict[str, Any] = {"kind": cls.kind}
     if COMPILED.get(cls.kind) is cls:

@@ -105,10 +105,10 @@ def _rates(model: Model, states: Floats) -> Floats:
 
 def _mirrors(model: Model, probes: Floats) -> list[Floats]:
     rates = _rates(model, probes)
-    found = []
+    symmetries = []
     for signs in product((1.0, -1.0), repeat=probes.shape[1]):
         sign = np.array(signs)
         # To the bit: a changed sign costs no rounding.
         if (sign < 0).any() and same_rates(_rates(model, sign * probes), sign * rates):
-            found.append(sign)
-    return found
+            symmetries.append(sign)
+    return symmetries

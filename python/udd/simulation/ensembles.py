@@ -175,15 +175,15 @@ def ensemble(
         raise ModelError('method="rodas" is for single runs, by udd.simulate')
     with progress_bar(runs, "run", progress) as bar:
         batch = Batch(model, rows, starts, rtol, atol, thread_count(threads), bar.since(), longest)
-        found = _core.ensemble(batch, times, stepper)
-    names = np.array(OUTCOMES)[found["outcome"]]
-    states = found["states"][:, wanted]
+        raw = _core.ensemble(batch, times, stepper)
+    names = np.array(OUTCOMES)[raw["outcome"]]
+    states = raw["states"][:, wanted]
     made = Ensemble(
         times[wanted],
         states.reshape(*shape, *states.shape[1:]),
         names.reshape(shape),
-        found["end"].reshape(*shape, -1),
-        found["t_end"].reshape(shape),
+        raw["end"].reshape(*shape, -1),
+        raw["t_end"].reshape(shape),
         model,
     )
     stopped = int((names == "interrupted").sum())

@@ -357,18 +357,18 @@ def simulate(
     >>> print(np.round(udd.simulate(mass, [0, 1, 2], [0, 0], inputs={"force": push}).x, 12))
     [0.         0.16666667 1.33333333]
     """
-    found = integrated(
+    trajectory = integrated(
         model, t, state0, rtol=rtol, atol=atol, max_step=max_step, method=method, dense=dense, inputs=inputs
     )
-    if found.outcome == "ejected":
+    if trajectory.outcome == "ejected":
         warnings.warn(
-            f"the disk left the wheels at t = {found.t[-1]:.6g} s, where the run ends; a disk with "
+            f"the disk left the wheels at t = {trajectory.t[-1]:.6g} s, where the run ends; a disk with "
             'edge="ignore" goes on by the equations alone, beyond where they hold',
             IncompleteWarning,
             stacklevel=2,
         )
-    warn_of(found.model, found.t, found.state, *tolerances(rtol, atol))
-    return found
+    warn_of(trajectory.model, trajectory.t, trajectory.state, *tolerances(rtol, atol))
+    return trajectory
 
 
 def integrated(
@@ -391,9 +391,9 @@ def integrated(
     stepper = method_for(model, method, rtol)
     model = driven(model, np.array([0.0, times]) if isinstance(times, float) else times, inputs)
     if isinstance(times, float):
-        found = _core.simulate(model, None, times, state.tolist(), rtol, atol, longest, stepper, dense)
+        raw = _core.simulate(model, None, times, state.tolist(), rtol, atol, longest, stepper, dense)
     else:
-        found = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, longest, stepper, dense)
-    events = Events(tuple(found["event_kind"]), found["event_t"], found["event_state"])
-    stats = Stats(*found["counts"], found["method"])
-    return Trajectory(found["t"], found["state"], events, found["outcome"], stats, model, found["dense"])
+        raw = _core.simulate(model, times, math.nan, state.tolist(), rtol, atol, longest, stepper, dense)
+    events = Events(tuple(raw["event_kind"]), raw["event_t"], raw["event_state"])
+    stats = Stats(*raw["counts"], raw["method"])
+    return Trajectory(raw["t"], raw["state"], events, raw["outcome"], stats, model, raw["dense"])
