@@ -125,7 +125,7 @@ def test_a_discovery_says_what_was_averaged():
     noise = 5e-3 * np.random.default_rng(3).standard_normal(len(t))
     record = udd.Measurement(t, {"theta": theta + noise})
     found = udd.discover(record, udd.Pendulum(0.6, k0=0.01), budget=1e-6)  # said whatever is found
-    assert "The record's 20000 frames were averaged over 5 at a time, to 3998" in found.remarks[-1]
+    assert "The record's 20000 frames were averaged in blocks of 5, to 3998" in found.remarks[-1]
 
 
 def test_a_fall_of_a_second_shows_the_air():

@@ -45,7 +45,7 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
     for answer in effect.by_record:
         (value,), (error,) = answer.parameters.values(), answer.errors.values()
         assert answer.answer == "wants it" and abs(value + 0.08) < 4 * error
-    assert found.remarks[0] == "abs(v)*v in v': wanted by 3 of 3 records."
+    assert found.remarks[0] == "abs(v)*v in v': significant in 3 of 3 records."
     # The record held out is in no fit: neither its frames nor what it lowers.
     assert set(found.fit.record.film.tolist()) == set(found.baseline.record.film.tolist()) == {0, 1, 2}
     np.testing.assert_array_equal(found.fit.measurements[3]["x"], given[1]["x"])
@@ -56,7 +56,7 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
     assert again.by_record == found.by_record and again.held_out == (1,)
     found.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert page.index("What we would believe of all records: abs(v)*v in v") < page.index("<img")
+    assert page.index("Supported by all records: abs(v)*v in v") < page.index("<img")
     assert "Whole records, by number 1, were held back." in page
 
 
@@ -100,12 +100,10 @@ def test_the_sentences() -> None:
 
     wants, not_, silent = "wants it", "does not want it", "cannot tell"
     assert sentence("drag", answers(wants, silent, wants)) == (
-        "drag: wanted by 2 of 3 records; record 1 cannot tell."
+        "drag: significant in 2 of 3 records; record 1 cannot show it."
     )
     both = [("drag", answers(wants, wants)), ("slip", answers(not_, wants))]
-    assert belief(both) == (
-        "What we would believe of all records: drag. Apart from that: slip: only record 1 wants it."
-    )
+    assert belief(both) == ("Supported by all records: drag. Not by all: slip: significant only in record 1.")
     assert belief([]) == ""
 
 

@@ -211,7 +211,7 @@ def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
     far = replace(fit, parameters={**fit.parameters, "W": 0.2 * discovered.DRIVE})
     doubted = replace(found, fit=far)
     (remark,) = doubted.remarks
-    assert remark.startswith("The fit leaves what was stated: W = 0.0084 ± ")
+    assert remark.startswith("A parameter is far from its given value: W = 0.0084 ± ")
     # It stands beside the verdict, not instead of it.
     assert as_text(summary_of(doubted)).splitlines()[0] == as_text(summary_of(found)).splitlines()[0]
     assert f"  {remark}\n".replace("±", "+-") in as_text(summary_of(doubted))
@@ -227,4 +227,4 @@ def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
             problem=replace(fit.problem, free=tuple(f for f in fit.problem.free if f.name in held)),
         ),
     ).remarks
-    assert remark.startswith("Held as stated, because they run away where they are free: W, clock.")
+    assert remark.startswith("Fixed at their given values, because they diverge if they are free: W, clock.")

@@ -1,4 +1,4 @@
-"""The loop's second half: which effect the model lacks, and the error before and after."""
+"""Find the terms missing from a fitted model and confirm them on held-out data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fits in full of a located curve, or of a formula for it, with everything else."""
+"""Full fits of a located curve, or of a formula for it, with everything else."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from udd.fitting.solve import done, solve
 
 Array = NDArray[np.float64]
 
-_MOVES = 12  # of a curve, most, for one model error
-_LOST = 3  # solves on end that do not converge, after which the curve leads nowhere
-_SHORTEST = 0.2  # share of a move, below which there is none that makes the fit better
-_WORSE = 1.02  # times chi2
-_SLOW = 0.01  # of chi2: where it falls by less the model may be held more tightly
+_MOVES = 12  # maximum of moves of a curve for one model error
+_LOST = 3  # consecutive solves without convergence, after which the curve is abandoned
+_SHORTEST = 0.2  # smallest share of a move; below it no move improves the fit
+_WORSE = 1.02  # factor in chi2 that a move may cost
+_SLOW = 0.01  # share of chi2; once it decreases by less the model error may be reduced
 _SOFT = 1e-3
-_STILL = 0.05  # nats that another move would bring
+_STILL = 0.05  # nats that another move must bring
 
 
 @dataclass(frozen=True, repr=False)
 class CurveFit(OneLine):
-    """A model with a curve, fitted.
+    """Fitted model with a curve.
 
     Attributes
     ----------
     fit : Fit
-        Its model holds the curve as its last effect.
+        Fit whose model has the curve as its last effect.
     curve : Curve
-        As it came out, its band less what the model's other parameters can do.
+        The fitted curve; its band excludes the part confounded with the model's other parameters.
     price : float
-        What the curve's freedom costs, nats: as half a parameter's logarithm of the numbers in the record is
-        by the Bayesian information criterion.
+        Cost of the curve's freedom, nats: the counterpart of half a parameter's log count of numbers in the
+        Bayesian information criterion.
     """
 
     fit: Fit
@@ -59,13 +59,13 @@ class CurveFit(OneLine):
 
 
 def curve_effect(curve: Curve, name: str = "curve") -> Effect:
-    """A curve, or a surface, as an effect that a model can have.
+    """Make an effect from a curve, or from a surface.
 
     Parameters
     ----------
     curve : Curve
     name : str
-        What its parameters are called after.
+        Prefix of its parameters' names.
     """
     spline, last = curve.splines[0], curve.splines[-1]
     if len(curve.coordinates) == 2:
@@ -94,18 +94,18 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
 def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     """Add a curve to a fitted model and refit everything: Gauss-Newton in the curve, the rest projected out.
 
-    In turns the curve is moved to where it is most likely, everything else following, and the model's
-    parameters and states are fitted with the curve held: first with the largest model error, around which all
-    is nearly linear, and once the curve is nearly still with a smaller one, as far as that goes. A move that
-    makes the fit worse is halved.
+    The curve is moved to its most probable position, everything else following; then the model's parameters
+    and states are fitted with the curve fixed; and so on in turns. It starts with the largest model error,
+    around which all is nearly linear. Once the curve is nearly still the model error is reduced, as far as
+    the fit converges. A move that makes the fit worse is halved.
 
     Parameters
     ----------
     fit : Fit
-        Around which the curve was found, or a looser one of the same data.
+        Fit around which the curve was scored, or one of the same data with a larger model error.
     curve : Curve
     name : str
-        What the effect's parameters are called after.
+        Prefix of the effect's parameters' names.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
         The curve cannot be added to a model, or the model with it cannot be solved.
     """
     curve = refined(curve, fit)
-    here = _Held(curve, curve.coefficients, _solved(fit, curve, name, fit, 0))
+    here = _FixedCurve(curve, curve.coefficients, _solved(fit, curve, name, fit, 0))
     slow = _SLOW
     while True:
         here, settled = _moved(fit, here, name, slow)
@@ -121,33 +121,33 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
         if tighter is None and not slow:
             break
         here, slow = (here, 0.0) if tighter is None else (tighter, _SLOW)
-    # What the model holds; the next move would be within the last one.
+    # The curve of the model; the next move would be within the last one.
     curve, at, score = replace(here.curve, coefficients=here.at), here.at, here.curve.score
     fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, done(here.fit))
     gain = float(score.gradient @ at - at @ score.information @ at / 2)
     price = gain - curve.evidence
-    if not settled:  # where the curve is still on its way, what it gains here says nothing of its price
+    if not settled:  # while the curve still moves, its gain here does not determine its price
         price = max(price, curve.df * math.log(fit.observations) / 2)
     return CurveFit(fitted, identifiable_part(curve, fitted), price)
 
 
 @dataclass(frozen=True)
-class _Held:
-    """The coefficients that a model holds its curve with, its fit, and the curve as it is likeliest there."""
+class _FixedCurve:
+    """Coefficients of the model's curve, its fit, and the most probable curve around it."""
 
     curve: Curve
     at: Array
     fit: Fit
 
 
-def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
-    """Move the curve until chi2 falls by no more than a share of itself, or is still; whether it settled."""
+def _moved(fit: Fit, here: _FixedCurve, name: str, slow: float) -> tuple[_FixedCurve, bool]:
+    """Move the curve until chi2 decreases little, or the curve is still; also return whether it settled."""
     at, current, fall, share, lost = here.at, here.fit, math.inf, 1.0, 0
-    for left in reversed(range(_MOVES)):
+    for remaining in reversed(range(_MOVES)):
         curve = rescored(here.curve, current, at)
         move, unit = curve.coefficients - at, max(1.0, current.scatter)
         settled = bool(move @ curve.score.information @ move / 2 < _STILL * unit)
-        if settled or not left or abs(fall) < max(slow * current.chi2, 2 * _STILL * unit):
+        if settled or not remaining or abs(fall) < max(slow * current.chi2, 2 * _STILL * unit):
             break
         while share >= _SHORTEST:
             to = at + share * move
@@ -165,11 +165,11 @@ def _moved(fit: Fit, here: _Held, name: str, slow: float) -> tuple[_Held, bool]:
             break
         fall = current.chi2 - moved.chi2
         at, current, share = to, moved, min(2 * share, 1.0)
-    return _Held(curve, at, current), settled
+    return _FixedCurve(curve, at, current), settled
 
 
-def _tightened(fit: Fit, here: _Held, name: str) -> _Held | None:
-    """The same with a smaller model error, or None where it cannot be."""
+def _tightened(fit: Fit, here: _FixedCurve, name: str) -> _FixedCurve | None:
+    """Reduce the model error; None if the fit then does not converge."""
     level = here.fit.level + 1
     if level == len(fit.problem.schedule):
         return None
@@ -183,16 +183,17 @@ def _tightened(fit: Fit, here: _Held, name: str) -> _Held | None:
 def _solved(
     fit: Fit, curve: Curve, name: str, start: Fit, level: int, steps: int = FEW, decrease: float = ROUGH
 ) -> Fit:
-    """The model with the curve held, as tightly as a level says, fitted from where another fit ended."""
+    """Fit the model with the curve fixed, at a level of model error, from the end of another fit."""
     problem, point = widened(fit, [curve_effect(curve, name)], start)
     problem = problem.with_model_error(problem.schedule[level])
     return solve(fit.measurements, problem, point, steps, decrease)
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:
-    """A formula for a curve as an effect that a model can have.
+    """Make an effect from a formula for a curve.
 
-    Broken powers, whose slope at zero has no end, are rounded off within a thousandth of the curve's range.
+    Broken powers, which have an infinite slope at zero, are rounded off within a thousandth of the curve's
+    range.
     """
     variable = curve.coordinates[0].text
     values: dict[str, Any] = dict(formula.parameters)
@@ -213,7 +214,7 @@ def fit_formula(
 ) -> Fit:
     """Add a formula for a curve to a fitted model and refit everything, all of its constants free.
 
-    The noise stays as it was estimated, so that chi2 compares with that of the curve.
+    The noise stays fixed, so that chi2 can be compared with that of the curve.
 
     Raises
     ------
@@ -225,7 +226,7 @@ def fit_formula(
     names = [f"{name}.{p}" for p in formula.parameters]
     more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
     problem = replace(problem, free=problem.free + more)
-    # Where its constants run away, or trade for each other, there is no end to come to.
+    # If its constants diverge, or are collinear, the fit has no end.
     return reduce_model_error(
         fit.measurements, problem, point, problem.schedule[1:], steps=FEW, goal=goal or ANY
     )

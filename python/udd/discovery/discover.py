@@ -1,4 +1,4 @@
-"""The loop's second half: which effect the model lacks."""
+"""Find the terms missing from a fitted model and confirm them on held-out data."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
 
-#: The share of the record that effects are sought in; the rest is held out.
+#: Share of the record for training; the rest is held out.
 TRAIN = 0.6
-_SHORTEST = 20  # frames: of fewer the first part determines no model and the rest tests none
+_SHORTEST = 20  # frames; with fewer the training part determines no model and the rest tests none
 
 
 @checked_arguments(error=FitError)
@@ -71,7 +71,7 @@ def discover(
     budget: float | None = None,
     progress: Progress = None,
 ) -> Discovery:
-    """Forward stepwise selection of missing effects, by score tests and held-out data.
+    """Select missing effects forward, by score tests and held-out data.
 
     *Candidates.* The model is fitted to the first 60 % of the record. A score test (Rao) ranks all effects of
     the library around that fit, and penalised splines of every coordinate. The best are fitted in full.
@@ -79,71 +79,84 @@ def discover(
 
     *Acceptance.* An effect is added if it passes these tests:
 
-    - The fall of chi2 is significant at 0.1 % over all candidates (Bonferroni), in the first 60 % and in all
-      data. In the latter the colour of the residuals counts.
+    - The decrease in chi2 is significant at 0.1 % over all candidates (Bonferroni), in the first 60 % and in
+      all data. In the latter the colour of the residuals counts.
     - Its amplitudes are physical.
-    - The last 40 % confirm it. With all parameters fixed their cost falls (95 % interval of the ratio below
-      1), or chi2 falls further by more than chance once they are fitted too. Where these frames carry too
-      little information, each half of the record must confirm it beside the other.
+    - The last 40 % confirm it. With all parameters fixed their cost decreases (95 % interval of the ratio
+      below 1), or chi2 decreases significantly further when they are fitted too. If these frames carry too
+      little information, each half of the record must confirm it after the other.
     - Forecasts get worse at no horizon.
     - No slow drift of the sensor's zero explains as much.
 
-    *Choice.* Of several forms that one is chosen which has the largest log evidence on all data, each at its
-    own noise and model error. Splines over the likely coordinates, their formulas and a power with a free
-    exponent compete with the library. What lies within 10 nats is named as an alternative. After an addition
-    all coefficients are refitted, and the search goes on.
+    *Choice.* Of several forms the one with the largest log evidence on all data is chosen, each at its own
+    noise and model error. Splines over the likely coordinates, their formulas and a power with a free
+    exponent compete with the library. Forms within 10 nats are listed as alternatives. After an addition all
+    coefficients are refitted, and the search continues.
 
-    *Verdict.* An effect is identified if it has no rival, is a law of one term, each of its constants is
-    determined, the held-out gain has a size, and nothing else is missing; `Discovery.doubts` says what speaks
-    against it. It is not identified either if random forces explain as much, such as those of a moving
-    support (a disk's film excludes them). It is not confirmed if free runs over the last 40 % do not get
-    significantly better, unless they are at the noise floor already. If nothing passes, but chi2 per degree
-    of freedom exceeds 2.5 or free runs lose the motion, the model lacks an effect that these data do not
-    name. The nearest candidates are listed with their held-out errors.
+    *Verdict.* An effect is identified if it has no rival, is a law of one term with all constants determined,
+    the held-out gain has a size, and nothing else is missing; `Discovery.doubts` lists reasons against it. It
+    is not identified if random forces explain as much, such as those of a moving support (a disk's film
+    excludes them). It is not confirmed if free runs over the last 40 % do not improve significantly, unless
+    they are at the noise floor already. If nothing passes, but chi2 per degree of freedom exceeds 2.5 or free
+    runs lose the motion, the model lacks an effect that these data do not identify. The closest candidates
+    are listed with their held-out errors.
 
-    Records of more than 8000 frames, of 2000 where inputs were measured, are averaged in blocks as far as
-    their motion and noise allow.
+    Records of more than 8000 frames (2000 if inputs were measured) are averaged in blocks as far as their
+    motion and noise allow.
 
-    *Parameters* of the model that the data do not determine are held near their stated values, give or take
-    as much, and the remarks say which.
+    *Parameters* of the model that the data do not determine are constrained to their given values ± 100 %,
+    and the remarks list them.
 
-    *Several records* share the model, and what is missing must be missing in all of them: the amplitudes of
-    what was found are fitted to each record apart, and where one that could show the effect does not want it,
-    it is not identified. Whole records can be held out instead of the last 40 % of each.
+    *Several records* share the model, and an effect must be missing in all of them. Its amplitudes are fitted
+    to each record separately; if it is not significant in a record that could show it, it is not identified.
+    Whole records can be held out instead of the last 40 % of each.
 
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
     model : Disk, Pendulum or a user's own Model, or a sequence of them
-        The known model; its parameters are the start and the priors' means.
+        The known model; its parameters are the start values and the means of the priors.
     free, camera, priors, each, state0
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
-        Terms to try in a user's own model beside those made of its states: the state in whose equation it
-        stands and the term, as in ``("v", "abs(v)*v")``; of a model with a mass matrix also a force, as in
-        ``("force(b - a)", "q^5")``.
+        Terms to try in a user's own model in addition to those made of its states: the state whose equation
+        gets the term, and the term, as in ``("v", "abs(v)*v")``; for a model with a mass matrix also a force,
+        as in ``("force(b - a)", "q^5")``.
     held_out : iterable of int, optional
-        Of several measurements, the numbers (from 0) of those that no fit sees: they are the held-out data.
-        Effects are sought in all frames of the others, and their cost on these alone confirms them. In names
-        like ``W[0]`` the measurements held out count last.
+        With several measurements, the numbers (from 0) of those that are held out whole and used by no fit.
+        Effects are sought in all frames of the others, and are confirmed only by their cost on these. In
+        names like ``W[0]`` the held-out measurements count last.
     budget : float, optional
-        Seconds after which the search ends with what it has, which the verdict then says. The known model's
-        fit, which comes first, and the last one are made in any case.
+        Seconds after which the search ends with its current result; the verdict then says so. The known
+        model's fit and the final one are made in any case.
     progress : bool or callable, optional
-        True or None: show what is being done; False: nothing. A function gets it in words.
+        True or None shows the current stage, False nothing. A function is called with it as text.
 
     Returns
     -------
     Discovery
+        `verdict` first; then `effects`, `alternatives`, `ratio` (held-out error after over before) and
+        `remarks`. ``udd.plot.evidence``, ``udd.plot.errors`` and ``udd.plot.curve`` draw it; ``report``
+        writes a page.
 
     Raises
     ------
     FitError
         The record is too short, or the model cannot be fitted to it.
 
+    See Also
+    --------
+    udd.fit : fit the known model alone.
+    udd.prune : remove needless terms.
+
+    References
+    ----------
+    Score test: C. R. Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50. Penalised splines: P. H. C. Eilers and
+    B. D. Marx, Stat. Sci. 11 (1996) 89. Information criterion: G. Schwarz, Ann. Stat. 6 (1978) 461.
+
     Examples
     --------
-    A pendulum that the air resists with the square of its speed; the model knows viscous friction only.
+    A pendulum with quadratic air resistance, whose model has viscous friction only.
 
     >>> import numpy as np, udd
     >>> t = np.arange(0, 60, 0.05)
@@ -157,34 +170,40 @@ def discover(
     assert callable(progress)
     clock = Clock(budget, progress)
     options = options_of(free, camera, priors, each)
-    order, apart = _held_out(measurement, held_out)
-    if apart and (each is not None or any("[" in name for name in priors or {})):
+    record_order, held_out_count = _held_out(measurement, held_out)
+    if held_out_count and (each is not None or any("[" in name for name in priors or {})):
         raise FitError(
-            "held_out cannot go with each, or with priors of single records: "
-            "nothing would determine what only a record that is held out has"
+            "held_out cannot be used with each, or with priors of single records: "
+            "the parameters of a held-out record would be undetermined"
         )
-    if apart:
-        measurement, model, state0 = (_ordered(one, order) for one in (measurement, model, state0))
+    if held_out_count:
+        measurement, model, state0 = (
+            _ordered(given_item, record_order) for given_item in (measurement, model, state0)
+        )
     thin = _thinned(continuous(measurement, model), model)
-    measurement = [own.measurement for own in thin]
+    measurement = [thin_part.measurement for thin_part in thin]
     if len(measurement) == 1:
         measurement, model, state0 = measurement[0], _only(model), _only(state0)
     record = record_of(measurement, model, state0)
-    one = _first(model)
-    given = _given(one, candidates)
+    first_model = _first(model)
+    given = _given(first_model, candidates)
     n = len(record.t)
     if n < _SHORTEST:
-        raise FitError(f"the record has {n} frames; to find an effect and test it takes at least {_SHORTEST}")
-    train = ~np.isin(record.film, range(len(order) - apart, len(order))) if apart else record.first(TRAIN)
+        raise FitError(f"the record has {n} frames; to find and test an effect needs at least {_SHORTEST}")
+    train = (
+        ~np.isin(record.film, range(len(record_order) - held_out_count, len(record_order)))
+        if held_out_count
+        else record.first(TRAIN)
+    )
     clock.finish("fitting the known model")
     background_import.importing("scipy.stats", "pyoperon.sklearn")
 
-    near: dict[str, tuple[float, float]] = {}
+    constrained: dict[str, tuple[float, float]] = {}
 
     def fits() -> tuple[Fit, ...]:
-        parts = (record.part(train), *(() if apart else (record,)))
+        parts = (record.part(train), *(() if held_out_count else (record,)))
         while True:
-            options["priors"] = {**near, **(priors or {})}
+            options["priors"] = {**constrained, **(priors or {})}
             try:
                 return tuple(
                     parallel_map(
@@ -195,34 +214,34 @@ def discover(
                 more = _near_the_stated(model, error.undetermined, options["priors"])
                 if not more:
                     raise
-                near.update(more)
+                constrained.update(more)
 
-    # Where whole records are held out, all data that a fit may see are those that effects are sought in.
+    # If whole records are held out, the training data are all data that a fit may use.
     base, *others_too = checked_units(measurement, model, options, fits)
     baseline = others_too[0] if others_too else base
     tests = Acceptance(record, ~train, clock, motion_time_scale(base), base.problem.free)
     search = Search(tests, given)
     before = search.tests.errors(base)
-    known = SearchState(base, baseline, before)
-    begin = _begin(search, known)
-    end = search.run(begin, known)
+    start_state = SearchState(base, baseline, before)
+    begin = _begin(search, start_state)
+    end = search.run(begin, start_state)
     clock.finish("fitting the model as found")
     final = refit(end.whole)
-    told = eased(final) if final.scatter > UNEXPLAINED else final
-    told = replace(told, unit_doubt=base.unit_doubt).without_cache().doubted()
-    found = [
-        replace(f, by_record=by_record(baseline, end.whole, f.effect, order)[0])
+    reported = eased(final) if final.scatter > UNEXPLAINED else final
+    reported = replace(reported, unit_doubt=base.unit_doubt).without_cache().doubted()
+    added = [
+        replace(f, by_record=by_record(baseline, end.whole, f.effect, record_order)[0])
         for step in end.accepted
-        for f in _describe(step, told)
+        for f in _describe(step, reported)
     ]
     others = [a for step in end.accepted for a in step.alternatives]
     doubtful = [a for a in others if a.likeness < SAME]
-    left = bool(found) and lacks_more(final, end.errors)
-    excused = camera_shows(known.whole, end.whole) if found and not end.stopped else None
-    ratio = search.tests.improvement(before, end.errors) if found else (1.0, 1.0, 1.0)
-    # Random forces foretell nothing: what makes free runs so much better is a law.
-    random = as_random(baseline, end.whole) if found and ratio[2] > FORETELLS else None
-    unexplained = not found and (
+    is_incomplete = bool(added) and lacks_more(final, end.errors)
+    excused = camera_shows(start_state.whole, end.whole) if added and not end.stopped else None
+    ratio = search.tests.improvement(before, end.errors) if added else (1.0, 1.0, 1.0)
+    # Random forces predict nothing: only a law improves free runs that much.
+    random = as_random(baseline, end.whole) if added and ratio[2] > FORETELLS else None
+    unexplained = not added and (
         max(baseline.scatter, final.scatter) > UNEXPLAINED
         or misses_the_motion(before, record, ~train)
         or lacks_more(final, end.errors)
@@ -231,35 +250,35 @@ def discover(
     stopped = end.stopped
     if unexplained and not rejected and end.rounds:
         try:
-            clock.tell("trying what comes nearest")
-            rejected = search.rejected(begin, end.rounds[-1], order)
+            clock.tell("trying the closest candidates")
+            rejected = search.rejected(begin, end.rounds[-1], record_order)
         except TimeUpError as up:
             stopped = stopped or str(up)
-    open_form = doubtful or left or random or excused is not None or unexplained
-    doubts = doubts_of(found, told, ratio, int(record.part(~train).observed.sum())) if found else []
-    verdict = verdict_of(found, bool(end.unconfirmed), doubts, bool(open_form), bool(stopped))
+    open_form = doubtful or is_incomplete or random or excused is not None or unexplained
+    doubts = doubts_of(added, reported, ratio, int(record.part(~train).observed.sum())) if added else []
+    verdict = verdict_of(added, bool(end.unconfirmed), doubts, bool(open_form), bool(stopped))
     return Discovery(
         verdict=verdict,
-        baseline=baseline.without_cache().doubted() if found else told,
-        fit=told,
-        effects=found,
+        baseline=baseline.without_cache().doubted() if added else reported,
+        fit=reported,
+        effects=added,
         alternatives=others,
         error_before=before,
         error_after=end.errors,
         ratio=ratio,
-        scans=[sorted(one.library.scored, key=lambda s: -s.chi2) for one in end.rounds],
-        curves=[one.curves for one in end.rounds],
-        comparisons=[one.comparisons for one in end.rounds],
-        split=float(record.clock[np.flatnonzero(~(record.first(TRAIN) if apart else train))[0]]),
+        scans=[sorted(scores.library.scored, key=lambda s: -s.chi2) for scores in end.rounds],
+        curves=[scores.curves for scores in end.rounds],
+        comparisons=[scores.comparisons for scores in end.rounds],
+        split=float(record.clock[np.flatnonzero(~(record.first(TRAIN) if held_out_count else train))[0]]),
         trained=end.part.without_cache(),
         rejected=rejected,
-        thinned=thin if any(own.every > 1 for own in thin) else [],
+        thinned=thin if any(thin_part.every > 1 for thin_part in thin) else [],
         budget=clock.budget if stopped else None,
         stopped=stopped,
-        excused=None if excused is None else [f.title for f in found if f.effect.name in excused],
+        excused=None if excused is None else [f.title for f in added if f.effect.name in excused],
         random=random.doubts.missed if random else [],
-        held_out=tuple(sorted(order[len(order) - apart :])),
-        undetermined=tuple(near),
+        held_out=tuple(sorted(record_order[len(record_order) - held_out_count :])),
+        undetermined=tuple(constrained),
         doubts=doubts,
     )
 
@@ -267,12 +286,12 @@ def discover(
 def _near_the_stated(
     model: Model | Sequence[Model], names: Iterable[str], priors: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
-    """Priors of parameters that have none: what was stated, give or take as much."""
+    """Return priors of parameters without one: the given value ± 100 %."""
     result = {}
     for label in sorted(names):
         name, _, film = label.partition("[")
-        own = model if isinstance(model, Model) else model[int(film.rstrip("]") or 0)]
-        value = own.parameters.get(name, 0.0)
+        model_of_film = model if isinstance(model, Model) else model[int(film.rstrip("]") or 0)]
+        value = model_of_film.parameters.get(name, 0.0)
         if value and not {label, name} & set(priors):
             result[label] = (value, abs(value))
     return result
@@ -281,18 +300,18 @@ def _near_the_stated(
 def _held_out(
     measurement: Measurement | Sequence[Measurement], held_out: Iterable[int] | None
 ) -> tuple[list[int], int]:
-    """The measurements' numbers, those to be held out last, and how many these are.
+    """Return the measurements' numbers, with the held-out ones last, and the count of these.
 
     Raises
     ------
     FitError
-        Numbers that there are not, or none that is left to fit.
+        A number does not exist, or no measurement is left to fit.
     """
     number = len(measurement) if isinstance(measurement, (list, tuple)) else 1
     if held_out is None:
         return list(range(number)), 0
     try:
-        last = sorted({operator.index(one) for one in held_out})
+        last = sorted({operator.index(number_given) for number_given in held_out})
     except TypeError:
         raise FitError(
             f"held_out must be a list of the measurements' numbers, as in held_out=[2], not {held_out!r}"
@@ -301,80 +320,82 @@ def _held_out(
         raise FitError(
             f"held_out must name some of the measurements 0 to {number - 1}, but not all, not {last}"
             if number > 1
-            else "held_out takes several measurements: of one its last part is held out"
+            else "held_out needs several measurements; with one its last part is held out"
         )
     return [k for k in range(number) if k not in last] + last, len(last)
 
 
-def _ordered(one: Any, order: Sequence[int]) -> Any:
-    """A list for several measurements in another order; what is one for all as it is."""
-    return [one[k] for k in order] if isinstance(one, (list, tuple)) and len(one) == len(order) else one
+def _ordered(given: Any, order: Sequence[int]) -> Any:
+    """Reorder a list for several measurements; return anything else unchanged."""
+    return (
+        [given[k] for k in order] if isinstance(given, (list, tuple)) and len(given) == len(order) else given
+    )
 
 
-def _only(one: Any) -> Any:
-    """What is in a list of one thing; all else as it is."""
-    return one[0] if isinstance(one, (list, tuple)) and len(one) == 1 else one
+def _only(given: Any) -> Any:
+    """Return the entry of a list of one; return anything else unchanged."""
+    return given[0] if isinstance(given, (list, tuple)) and len(given) == 1 else given
 
 
 def _first(models: Any) -> Any:
-    """The first of a list of models, None of an empty one; a model alone as it is."""
+    """Return the first of a list of models, or None if it is empty; a single model is returned unchanged."""
     return next(iter(models), None) if isinstance(models, (list, tuple)) else models
 
 
 def _thinned(
     measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
 ) -> list[Thinned]:
-    """The measurements, those that were sampled more often than their motion needs by block averages."""
+    """Thin measurements that were sampled faster than their motion requires."""
     some: list[Measurement] = [measurement] if isinstance(measurement, Measurement) else []
     if isinstance(measurement, (list, tuple)):
         some = list(measurement)
-    if not some or not all(isinstance(own, Measurement) for own in some):
-        record_of(measurement, model)  # which says what is wrong
-    return [thinned(own) for own in some]
+    if not some or not all(isinstance(part, Measurement) for part in some):
+        record_of(measurement, model)  # which raises the error
+    return [thinned(part) for part in some]
 
 
-def _begin(search: Search, known: SearchState) -> SearchState:
-    """Where the search begins: the known model's fit, but for one whose drive or camera ran away.
+def _begin(search: Search, start: SearchState) -> SearchState:
+    """Return the start of the search: the known model's fit, or one with its drive and camera fixed.
 
-    There a strong effect is missing, and what else could be free bends until it hides what that is.
+    If the drive or the camera ran away, a strong effect is missing, and the free parameters would hide it.
     """
-    if not (ran_away(known.part) or ran_away(known.whole)):
-        return known
-    # Without this a strong cubic drag is taken for a formula of the friction.
+    if not (ran_away(start.part) or ran_away(start.whole)):
+        return start
+    # Without this a formula of the friction replaces a strong cubic drag.
     try:
-        part, whole = both(as_stated, known.part, known.whole)
+        part, whole = both(as_stated, start.part, start.whole)
         return SearchState(part, whole, search.tests.errors(part))
     except FitError:
-        return known
+        return start
 
 
 def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:
-    """The user's own candidates."""
+    """Make the user's own candidates."""
     listed = list(candidates)
     if isinstance(model, FormulaModel):
         return given_terms(model, listed)
     if listed:
         raise FitError(
-            "candidates can be given for a model of your own; a disk's and a pendulum's are the library's"
+            "candidates are for a model of your own; those of a disk and a pendulum come from the library"
         )
     return []
 
 
 def _title(candidate: Candidate, fitted: Effect) -> str:
-    """What a reader calls an effect: its candidate's title, with the frequency that was fitted."""
+    """Return an effect's title for a reader: its candidate's, with the fitted frequency."""
     if fitted.spec.shaped:
         return fitted.title
     title = candidate.title
     for p in fitted.spec.parameters:
         if p.role == "frequency":
-            tried, found = candidate.effect.parameters[p.name], fitted.parameters[p.name]
+            tried, fitted_value = candidate.effect.parameters[p.name], fitted.parameters[p.name]
             for digits in (4, 3):
-                title = title.replace(f" {tried:.{digits}g} ", f" {found:.4g} ")
+                title = title.replace(f" {tried:.{digits}g} ", f" {fitted_value:.4g} ")
     return title
 
 
 def _describe(step: Step, final: Fit) -> list[AddedEffect]:
-    """The effects of a step, with the numbers of the fit to all data."""
+    """Describe the effects of a step, with the numbers of the fit to all data."""
     result = []
     for candidate in step.candidates:
         effect = next(e for e in final.model.effects if e.name == candidate.effect.name)

@@ -1,4 +1,4 @@
-"""Experiment design: what to film next where the data cannot decide between forms."""
+"""Experiment design: the next film that would distinguish forms that the data cannot."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Forms part where their fits differ by as many units of log-likelihood, as in the search.
+#: Expected difference in log likelihood (nats) from which on forms are distinguished, as in the search.
 SEPARATED = 10.0
-_STARTS = 6  # places of the record that a further film may start from, tried in turn
-_SHORTEST = 0.5  # of the film's length: a disk that leaves sooner makes no film
+_STARTS = 6  # places of the record from which a further film may start, tried in turn
+_SHORTEST = 0.5  # share of the film's length: if the disk loses contact sooner, the film is not feasible
 
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """What to film, and what that is expected to tell.
+    """Next film, and what it is expected to show.
 
     Attributes
     ----------
     design : str
-        What to film; empty where no feasible film would part any of the forms.
+        Description of the film; empty if no feasible film would distinguish any of the forms.
     nats : float
-        By how many units of log-likelihood the forms are expected to differ then: the least of those that
-        part, or the most where none does.
+        Expected difference in log likelihood between the forms: the least of those that would be
+        distinguished, or the most if none would.
     each : dict of str to float
         The same for each alternative, by its title.
     text : str
-        The advice in a sentence.
+        The advice in one sentence.
     """
 
     design: str
@@ -59,26 +59,26 @@ class NextExperiment:
 
     @property
     def parts(self) -> list[str]:
-        """Titles of the alternatives that part from what was chosen."""
+        """Titles of the alternatives that the film would distinguish from the chosen form."""
         return [title for title, nats in self.each.items() if nats >= SEPARATED]
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the advice as JSON-ready values."""
         return {"design": self.design, "nats": self.nats, "each": self.each, "text": self.text}
 
 
 @dataclass(frozen=True)
 class Film:
-    """A film that could be made.
+    """Film that could be made.
 
     Attributes
     ----------
     design : str
     model : Model
     start : ndarray (k, d)
-        States that it may start from, tried in turn.
+        Possible start states, tried in turn.
     again : bool
-        Whether it goes on where the first ended, with its camera and drive.
+        True if it continues at the end of the first one, with its camera and drive.
     """
 
     design: str
@@ -87,25 +87,25 @@ class Film:
     again: bool = False
 
 
-def hints(found: Discovery) -> list[NextExperiment]:
-    """What could be filmed to part the forms that the data cannot tell apart, the best first.
+def hints(discovery: Discovery) -> list[NextExperiment]:
+    """Rank films that would distinguish the forms that the data cannot, the best first.
 
-    Each film is simulated with the model as found and added to the part of the record that the forms were
-    compared on; drive and camera of a new film are as unknown as those of the first. Where a form with the
-    amplitudes ``a`` is true and another is fitted, chi2 rises by ``a (S - C T^-1 C') a``: ``S`` and ``T`` are
-    the information on the amplitudes of the two with everything else refitted, ``C`` what they share. Half
-    the rise, of the two forms the lesser, is what the data are expected to tell; to what the present data
-    say already the film adds by how much that grows.
+    Each film is simulated with the discovered model and added to the part of the record on which the forms
+    were compared; drive and camera of a new film are as uncertain as those of the first. If a form with the
+    amplitudes ``a`` is true and another is fitted, chi2 increases by ``a (S - C T^-1 C') a``: ``S`` and ``T``
+    are the information on the amplitudes of the two with everything else refitted, ``C`` is their cross
+    information. Half of the increase, the smaller of the two forms', is the expected difference in log
+    likelihood. The film's gain is added to the difference in the present data.
 
     Parameters
     ----------
-    found : Discovery
+    discovery : Discovery
 
     Returns
     -------
     list of NextExperiment
-        One for every film that parts any; if there is none, one that says so; empty where nothing is in
-        doubt.
+        One for every film that distinguishes some of the forms. If there is no such film, one that says so.
+        Empty if no form is in doubt.
 
     Examples
     --------
@@ -117,15 +117,15 @@ def hints(found: Discovery) -> list[NextExperiment]:
     >>> found.hints
     []
     """
-    if not found.alternatives:
+    if not discovery.alternatives:
         return []
-    pairs = [pair for other in found.alternatives if (pair := _Pair.of(found, other))]
+    pairs = [pair for other in discovery.alternatives if (pair := _Pair.of(discovery, other))]
     if not pairs:
         return []
     now = [pair.nats(None) for pair in pairs]
 
-    def told(film: Film) -> tuple[str, dict[str, float]] | None:
-        filmed = _filmed(found.trained, film)
+    def predicted(film: Film) -> tuple[str, dict[str, float]] | None:
+        filmed = _filmed(discovery.trained, film)
         if filmed is None:
             return None
         each: dict[str, float] = {}
@@ -134,12 +134,12 @@ def hints(found: Discovery) -> list[NextExperiment]:
             each[pair.other.title] = float(min(nats, each.get(pair.other.title, np.inf)))
         return film.design, each
 
-    designs = [design for design in parallel_map(told, _films(found.trained)) if design]
+    designs = [design for design in parallel_map(predicted, _films(discovery.trained)) if design]
     return _ranked(designs)
 
 
 def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperiment]:
-    """The designs in words: those that part most forms first."""
+    """Describe the designs: those that distinguish most forms first."""
     result = []
     for design, each in designs:
         parts = [nats for nats in each.values() if nats >= SEPARATED]
@@ -152,7 +152,9 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
     if result:
         return sorted(result, key=lambda hint: (-len(hint.parts), -hint.nats))
     if not designs:
-        return [NextExperiment("", 0.0, {}, "no film that could be made here keeps the disk for long enough")]
+        return [
+            NextExperiment("", 0.0, {}, "no feasible film keeps the disk between the wheels for long enough")
+        ]
     design, each = max(designs, key=lambda d: max(d[1].values()))
     most = max(each.values())
     text = (
@@ -163,20 +165,20 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
 
 
 def _films(fit: Fit) -> Iterator[Film]:
-    """What could be filmed of the device."""
-    model, states, own = fit.models[0], fit.states, fit.record.film == 0
-    ends = fit.states[own][-1:]
-    places = states[own][np.linspace(0, own.sum() - 1, _STARTS).astype(int)]
+    """Yield films that could be made of the device."""
+    model, states, first_film = fit.models[0], fit.states, fit.record.film == 0
+    ends = fit.states[first_film][-1:]
+    places = states[first_film][np.linspace(0, first_film.sum() - 1, _STARTS).astype(int)]
     for design, parameters, start in model.profile.discovery.films(model, places):
         yield Film(design, model.with_parameters(parameters) if parameters else model, start)
     yield Film("on for as long again", model, ends, again=True)
 
 
 def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
-    """Times and states of a film, as many frames as the first; None where the disk leaves too soon."""
-    own = fit.record.film == 0
-    frames = int(own.sum())
-    times = fit.record.t[own]
+    """Simulate a film as long as the first one; None if the disk loses contact too soon."""
+    first_film = fit.record.film == 0
+    frames = int(first_film.sum())
+    times = fit.record.t[first_film]
     t = np.median(np.diff(times)) * np.arange(frames)
     longest: Array = np.zeros((0, fit.states.shape[1]))
     for start in film.start:
@@ -184,7 +186,7 @@ def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
             run = integrated(film.model, t + (times[-1] if film.again else 0.0), start, rtol=1e-7, atol=1e-9)
         except UddError:
             continue
-        # What leaves is cut at the edge, where the last time is no frame's.
+        # A run that loses contact is cut at the edge; its last time is not a frame's.
         states = run.state if run.outcome == "finished" else run.state[:-1]
         longest = max(longest, states, key=len)
         if len(longest) == frames:
@@ -194,16 +196,16 @@ def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """A form that was chosen and one that could be it, around the fit that they were compared on."""
+    """Chosen form and a rival, around the fit on which they were compared."""
 
     fit: Fit
     chosen: Candidate
     other: Alternative
 
     @classmethod
-    def of(cls, found: Discovery, other: Alternative) -> _Pair | None:
-        """None where the model has the alternative already, beside what was chosen."""
-        model = found.trained.model
+    def of(cls, discovery: Discovery, other: Alternative) -> _Pair | None:
+        """Make the pair; None if the model already has the rival in addition to the chosen form."""
+        model = discovery.trained.model
         effect = next((e for e in model.effects if e.name == other.instead_of), None)
         if effect is None:
             return None
@@ -211,11 +213,11 @@ class _Pair:
         named = renamed(other.effect, rest)
         if named is None:
             return None
-        return cls(found.trained, Candidate(effect, effect.title), replace(other, effect=named))
+        return cls(discovery.trained, Candidate(effect, effect.title), replace(other, effect=named))
 
     @cached_property
     def free(self) -> tuple[Free, ...]:
-        """All that is free but the chosen form."""
+        """Free parameters without those of the chosen form."""
         name = self.chosen.effect.name
         order = list(self._without(self.fit.models[0]).parameters)
         kept = (f for f in self.fit.problem.free if not f.name.startswith(f"{name}."))
@@ -227,7 +229,7 @@ class _Pair:
         return model.with_effects([e for e in model.effects if e.name != self.chosen.effect.name])
 
     def nats(self, more: tuple[Film, tuple[Array, Array]] | None) -> float:
-        """How far the two are expected to be apart with one more film, or with none."""
+        """Compute the forms' expected difference in log likelihood, with or without a further film."""
         problem, point = self._with(more)
         model = problem.models[0]
         forms = [_still(self.chosen), _still(Candidate(self.other.effect, self.other.title))]
@@ -235,14 +237,14 @@ class _Pair:
             problem.at(point), [(c.added_to(model), c.amplitude_indices(model)) for c in forms]
         )
         k = len(self.chosen.amplitude_names)
-        mine, others = np.arange(k), np.arange(k, len(information))
+        effects, rival_effects = np.arange(k), np.arange(k, len(information))
         a = _amplitudes(self.chosen.effect)
         b = _amplitudes(self.other.effect)
-        rises = _rise(information, mine, others, a), _rise(information, others, mine, b)
+        rises = _rise(information, effects, rival_effects, a), _rise(information, rival_effects, effects, b)
         return 0.5 * min(rises) / max(self.fit.scatter, 1.0)
 
     def _with(self, more: tuple[Film, tuple[Array, Array]] | None) -> tuple[Problem, Point]:
-        """The problem without the chosen form and with a further film, at what would be found."""
+        """Return the problem without the chosen form and with a further film, at the expected solution."""
         fit, problem = self.fit, self.fit.problem
         models = tuple(self._without(m) for m in fit.models)
         sets = [
@@ -258,17 +260,17 @@ class _Pair:
         weight = np.concatenate([problem.noise.weight, np.ones(len(t))])
         free = self.free
         if not film.again:
-            own = self._without(film.model)
-            free = _for_films(free, models, own)
-            models = (*models, own)
-            sets.append(sets[0]._replace(model=list(own.parameters.values())))
+            film_model = self._without(film.model)
+            free = _for_films(free, models, film_model)
+            models = (*models, film_model)
+            sets.append(sets[0]._replace(model=list(film_model.parameters.values())))
         noise = replace(problem.noise, weight=weight)
         longer = replace(problem, models=models, record=record, free=free, noise=noise)
         return longer, Point(np.concatenate([fit.states, states]), tuple(sets))
 
 
 def _still(candidate: Candidate) -> Candidate:
-    """The candidate with its amplitudes at zero."""
+    """Set the candidate's amplitudes to zero."""
     effect = candidate.effect
     return replace(candidate, effect=effect.replace(**dict.fromkeys(effect.amplitudes, 0.0)))
 
@@ -278,14 +280,14 @@ def _amplitudes(effect: Effect) -> Array:
 
 
 def _rise(information: Array, true: NDArray[np.int64], fitted: NDArray[np.int64], amplitudes: Array) -> float:
-    """By how much chi2 is larger where one form is true and the other is fitted."""
+    """Compute the increase in chi2 if one form is true and the other is fitted."""
     shared = information[np.ix_(true, fitted)]
     taken = shared @ np.linalg.pinv(information[np.ix_(fitted, fitted)], hermitian=True) @ shared.T
     return max(float(amplitudes @ (information[np.ix_(true, true)] - taken) @ amplitudes), 0.0)
 
 
 def _longer(record: Record, t: Array, states: Array, film: int) -> Record:
-    """A record with a further film's frames at its end, as well seen as the others are on average."""
+    """Append a further film's frames to a record, with the average noise of the others."""
     n, channels = len(t), record.seen.shape[1]
     typical = [np.median(s[np.isfinite(s)]) if np.isfinite(s).any() else np.inf for s in record.sigma.T]
     times = t if film else t + record.t[record.film == 0][-1]
@@ -305,9 +307,9 @@ def _longer(record: Record, t: Array, states: Array, film: int) -> Record:
 
 
 def _for_films(free: Sequence[Free], models: Sequence[Model], more: Model) -> tuple[Free, ...]:
-    """What is free with one film more, whose drive and camera are its own."""
+    """Return the free parameters with a further film, which has its own drive and camera."""
     if len(models) == 1:
-        free = [replace(f, film=0, name=f"{f.name}[0]") if _own(f) else f for f in free]
+        free = [replace(f, film=0, name=f"{f.name}[0]") if is_film_specific(f) else f for f in free]
     first = [f for f in free if f.film == 0]
     added = []
     for f in first:
@@ -320,6 +322,6 @@ def _for_films(free: Sequence[Free], models: Sequence[Model], more: Model) -> tu
     return (*free, *added)
 
 
-def _own(free: Free) -> bool:
-    """Whether every film has its own."""
+def is_film_specific(free: Free) -> bool:
+    """Return True if every film has its own value."""
     return free.role != "model" or free.name == "W"

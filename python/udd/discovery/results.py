@@ -1,4 +1,4 @@
-"""What a discovery found."""
+"""Result of a discovery."""
 
 from __future__ import annotations
 
@@ -28,40 +28,40 @@ if TYPE_CHECKING:
 
 
 def _named(ratio: Ratio) -> dict[str, float]:
-    """A ratio with its interval, as a machine reads it."""
+    """Label a ratio and its interval, as JSON-ready values."""
     return dict(zip(("value", "low", "high"), ratio, strict=True))
 
 
 @dataclass(frozen=True, repr=False)
 class AddedEffect(OneLine):
-    """An effect that was added, with its numbers and its evidence.
+    """Added effect, with its parameters and its evidence.
 
     Attributes
     ----------
     effect : Effect
-        With the fitted parameters (all data).
+        The effect with the parameters fitted to all data.
     title, equation, expression : str
-        In prose, as the library writes it, and with the numbers in it.
+        Its name for a reader, its formula, and the formula with the numbers inserted.
     parameters, errors : dict of str to float
         The fitted parameters with standard errors.
     chi2 : float
-        By how much chi2 fell when it was added, in units of the fit's scatter.
+        Decrease in chi2 when it was added, in units of the fit's scatter.
     p : float
-        Probability of so large a fall by chance, all candidates counted.
+        Probability of so large a decrease by chance, over all candidates.
     ratio : tuple of float
-        Cost of the held-out frames after over before, all parameters held, with its 95 % interval.
+        Cost of the held-out frames after over before, all parameters fixed, with its 95 % interval.
     witness : {"held", "fitted", "halves"}
-        What bears it out: that cost, the held-out frames once they are fitted too, or each half of the record
-        in alternate stretches.
+        Test that confirms it: that cost, a further decrease in chi2 when the held-out frames are fitted too,
+        or each half of the record in alternate blocks.
     curve : Curve or None
-        Where it was located without a formula: the curve with its band. The effect is that, or a formula
-        for it.
+        The located curve with its band, if it was located without a formula. The effect is this curve, or a
+        formula for it.
     is_law : bool
-        Whether it is a term of the library, or of the user, a power, or a formula of one term.
+        True for a term of the library or of the user, a power, or a formula of one term.
     tried : str
-        What it was called as a candidate, with the shape and the frequency that it was tried with.
+        Its title as a candidate, with the shape and the frequency of the trial.
     by_record : list of RecordAnswer
-        Of several records that were fitted together, what each says of it.
+        The answer of each of several records that were fitted together.
     """
 
     effect: Effect
@@ -80,15 +80,15 @@ class AddedEffect(OneLine):
     by_record: list[RecordAnswer] = field(default_factory=list)
 
     def like_a_drift(self, model: Model) -> bool:
-        """Whether it was located as a curve over time alone, as the zero of a sensor that drifts is one.
+        """Return True for a curve over time alone, which may be the drift of a sensor's zero.
 
-        Not of a disk, which a camera sees.
+        A disk's is none, because a camera sees it.
         """
         over = [] if self.curve is None else [c.name for c in self.curve.coordinates]
         return over == ["t"] and not model.profile.sensor.sees_marks
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the effect as JSON-ready values."""
         return {
             "name": self.effect.name,
             "momentum": self.effect.momentum,
@@ -100,13 +100,13 @@ class AddedEffect(OneLine):
             "p": self.p,
             "held_out_cost_ratio": _named(self.ratio),
             "borne_out_by": self.witness,
-            "by_record": [own.to_dict() for own in self.by_record],
+            "by_record": [answer.to_dict() for answer in self.by_record],
         }
 
 
 @dataclass(frozen=True, repr=False)
 class Alternative(OneLine):
-    """A candidate that the data cannot tell from one that was chosen.
+    """Candidate that the data cannot distinguish from the chosen one.
 
     Attributes
     ----------
@@ -115,9 +115,9 @@ class Alternative(OneLine):
     effect : Effect
     title, equation : str
     nats : float
-        By how much worse it fits, in units of log-likelihood; negative where it fits better.
+        Log likelihood of the chosen form minus that of this one; negative if this one fits better.
     likeness : float
-        How alike the two act on these data, 0 to 1; 1 cannot be told apart at any length of record.
+        Likeness of their effects on these data, 0 to 1; at 1 no length of record distinguishes them.
     """
 
     instead_of: str
@@ -128,7 +128,7 @@ class Alternative(OneLine):
     likeness: float
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the alternative as JSON-ready values."""
         return {
             "instead_of": self.instead_of,
             "name": self.effect.name,
@@ -142,27 +142,28 @@ class Alternative(OneLine):
 
 @dataclass(frozen=True, repr=False)
 class RejectedEffect(OneLine):
-    """An effect that lowers the held-out error of a model which lacks something, but does not pass the tests.
+    """Effect that decreases the held-out error of an incomplete model, but does not pass the tests.
 
     Attributes
     ----------
     effect : Effect
-        With the parameters fitted to all data.
+        The effect with the parameters fitted to all data.
     title : str
     chi2, p : float
-        By how much chi2 falls, in units of what remains at the same frequencies, and the probability of that
-        by chance, all candidates, curves and surfaces counted.
+        Decrease in chi2, in units of the remaining misfit at the same frequencies, and the probability of
+        that by chance, over all candidates, curves and surfaces.
     errors : Errors
         Held-out errors of the model with it.
     ratio : tuple of float
         Held-out error with it over that without, as for :attr:`Discovery.ratio`.
     why : {"chance", "drift", "part", "held", "form", "unconfirmed", "records"}
-        Why it is not added: chance does as much, in all data or in the part that effects are sought in; a
-        slow drift of the sensor's zero explains more; the held-out data do not bear it out; another form that
-        fits clearly better does not pass; or it passed, but free runs over the held-out data do not get
-        better beyond doubt; or only some of several records want it, though the others could show it.
+        Reason for its rejection. ``"chance"``: not significant in all data. ``"part"``: not in the training
+        part. ``"drift"``: a slow drift of the sensor's zero explains more. ``"held"``: the held-out data do
+        not confirm it. ``"form"``: a form that fits clearly better does not pass. ``"unconfirmed"``: it
+        passed, but free runs over the held-out data do not improve significantly. ``"records"``: it is
+        significant in only some of several records, though the others could show it.
     by_record : list of RecordAnswer
-        Of several records that were fitted together, what each says of it.
+        The answer of each of several records that were fitted together.
     """
 
     effect: Effect
@@ -175,7 +176,7 @@ class RejectedEffect(OneLine):
     by_record: list[RecordAnswer] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the rejected effect as JSON-ready values."""
         return {
             "name": self.effect.name,
             "momentum": self.effect.momentum,
@@ -186,63 +187,69 @@ class RejectedEffect(OneLine):
             "p": self.p,
             "error": self.errors.to_dict(),
             "held_out_ratio": _named(self.ratio),
-            "by_record": [own.to_dict() for own in self.by_record],
+            "by_record": [answer.to_dict() for answer in self.by_record],
         }
 
 
 @dataclass(frozen=True)
 class Discovery:
-    """What a model lacks, given measured motion.
+    """Result of :func:`udd.discover`: the terms that a model lacks, with the evidence.
 
     Attributes
     ----------
     verdict : str
-        ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or
-        ``"fits the first part, not confirmed"`` where free runs over the held-out data do not bear it out:
-        what that is stands in `rejected`. ``"search not finished"`` where its time was up before anything
-        was found.
+        ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or ``"fits
+        the first part, not confirmed"`` if free runs over the held-out data do not confirm the effect, which
+        is then in `rejected`. ``"search not finished"`` if the time was up before anything was found.
     baseline, fit : Fit
-        The model without and with the added effects, each fitted to all data; the same where none was added.
+        The model without and with the added effects, each fitted to all data; the same if none was added.
     effects : list of AddedEffect
-        The effects that were added; empty when nothing is missing.
+        The added effects; empty if nothing is missing.
     alternatives : list of Alternative
-        Candidates that the data cannot tell apart from the chosen ones.
+        Candidates that the data cannot distinguish from the chosen ones.
     error_before, error_after : Errors
-        The same held-out errors, of models fitted without the held-out data; the noise floor beside them.
+        Held-out errors of models fitted without the held-out data, with the noise floor.
     ratio : tuple of float
-        Held-out error after over before, with its 95 % interval: of the disk at :func:`comparison_horizon`,
-        of a pendulum over the whole held-out part.
+        Held-out error after over before, with its 95 % interval: for the disk at :func:`comparison_horizon`,
+        for a pendulum over the whole held-out part.
     scans : list of list of Scored
-        What the score said of every candidate, for each round of the search, the best first.
+        Scores of all candidates, for each round of the search, the best first.
     curves : list of list of Curve
-        The same of every curve that an equation may lack, as a function of anything.
+        Scores of all curves, for each round.
     comparisons : list of int
-        How many candidates and curves each round looked at, every frequency counted.
+        Count of candidates and curves in each round, every frequency included.
     split : float
-        Time from which the data were held out, s; of the first measurement.
+        Start of the held-out data, s; of the first measurement.
     rejected : list of RejectedEffect
-        Where an effect is present but none passes: what comes nearest, the best first. Also what passed but
-        was not confirmed.
+        If an effect is present but none passes: those that come closest, the best first. Also effects that
+        passed but were not confirmed.
     thinned : list of Thinned
-        What became of measurements with more frames than their motion needs: block averages, which the
-        measurements of `fit` are then. Empty where all frames were taken as they were.
+        Block averages of measurements with more frames than their motion requires; the measurements of `fit`
+        are then these. Empty if all frames were used.
     budget : float or None
-        The seconds that ended the search before it was done, where they did.
+        The limit in seconds, if it ended the search.
     stopped : str or None
-        What it was at then.
+        The activity at that time.
     excused : list of str or None
-        Where parameters of the camera were held and its faults would explain most of what the found model
-        leaves, or a part of what was found: titles of the effects that they would explain as well.
+        If parameters of the camera were fixed: titles of the effects that the camera's errors would explain
+        as well. Empty if they would explain most of the remaining misfit, or a part of an effect. None if
+        they would not.
     random : list of ModelError
-        The random forces that the model needs beside the effects, where such forces alone, like those of a
-        support that moves, explain the data about as well: the effects are not identified then.
+        Random forces that the model needs in addition to the effects, if random forces alone, as from a
+        moving support, explain the data about as well. The effects are then not identified.
     held_out : tuple of int
-        The numbers of the measurements that were held out whole; none where the last part of each was. Then
-        `split` is the time in the first measurement from which pictures show free runs.
+        Numbers of the measurements that were held out whole; empty if the last part of each was. Then `split`
+        is the time in the first measurement from which pictures show free runs.
     undetermined : tuple of str
-        Parameters that the data do not determine, held near what was stated.
+        Parameters that are not identifiable from the data; they were constrained to their given values.
     doubts : list of str
-        What speaks against naming the form of what was found, in sentences.
+        Reasons against naming the form of the effects, in sentences.
+
+    See Also
+    --------
+    udd.plot.evidence : draw the candidates' decreases in chi2.
+    udd.plot.errors : draw the held-out errors before and after.
+    udd.plot.curve : draw a located curve.
     """
 
     verdict: str
@@ -272,14 +279,14 @@ class Discovery:
     refused = renamed_attribute("refused", "rejected")
 
     def __repr__(self) -> str:
-        """The verdict on one line."""
-        found = ", ".join(effect.title for effect in self.effects)
+        """Describe the verdict on one line."""
+        titles = ", ".join(effect.title for effect in self.effects)
         value, low, high = self.ratio
-        error = f"; held-out error x {value:.3g} ({low:.3g} to {high:.3g})" if found else ""
-        return f"<Discovery: {self.verdict}{': ' if found else ''}{found}{error}>"
+        error = f"; held-out error x {value:.3g} ({low:.3g} to {high:.3g})" if titles else ""
+        return f"<Discovery: {self.verdict}{': ' if titles else ''}{titles}{error}>"
 
     def _repr_html_(self) -> str:
-        """The verdict's card, for notebooks."""
+        """Format the verdict for notebooks."""
         from html import escape
 
         def numbers(effect: AddedEffect) -> str:
@@ -303,7 +310,7 @@ class Discovery:
 
     @property
     def horizon(self) -> float | None:
-        """The horizon that `ratio` is taken at, s; None for the whole held-out part."""
+        """Horizon of `ratio`, s; None for the whole held-out part."""
         return comparison_horizon(self.error_before) if self.error_before.unit != "rad" else None
 
     @property
@@ -313,89 +320,93 @@ class Discovery:
 
     @property
     def noise(self) -> list[Reading]:
-        """What the frames of each channel are good to, as the record shows it; of means where it was thinned.
+        """Noise of each channel's frames, as the record shows it; of block means if the record was thinned.
 
         See :class:`udd.fitting.diagnostics.Reading`.
         """
         steps = self.thinned[0].steps if self.thinned else {}
-        return [replace(one, step=steps.get(one.name, one.step)) for one in readings(self.fit)]
+        return [
+            replace(reading, step=steps.get(reading.name, reading.step)) for reading in readings(self.fit)
+        ]
 
     @property
     def by_record(self) -> list[tuple[str, list[RecordAnswer]]]:
-        """Titles, and what each of several records says: of what was found, and of what only some want."""
-        found = [(one.title, one.by_record) for one in self.effects]
-        found += [(one.title, one.by_record) for one in self.rejected if one.why == "records"]
-        return [own for own in found if own[1]]
+        """Titles with the answers of several records, for added effects and for those that some support."""
+        answers = [(effect.title, effect.by_record) for effect in self.effects]
+        answers += [(effect.title, effect.by_record) for effect in self.rejected if effect.why == "records"]
+        return [entry for entry in answers if entry[1]]
 
     @property
     def remarks(self) -> list[str]:
-        """What there is to doubt of the final model's numbers, in sentences; empty where nothing is."""
+        """Caveats about the final fit, one sentence each."""
         said = [sentence(title, answers) for title, answers in self.by_record] + self.doubts
-        said += [f"The fit leaves what was stated: {one.text}." for one in ran_off(self.fit)]
+        said += [f"A parameter is far from its given value: {runaway.text}." for runaway in ran_off(self.fit)]
         if doubt := self.fit.unit_doubt:
-            said.append(f"{doubt[0].upper()}{doubt[1:]}. The fit is that of the numbers as stated.")
+            said.append(f"{doubt[0].upper()}{doubt[1:]}. The fit uses the given units.")
         if self.effects and lacks_more(self.fit, self.error_after):
-            said.append("Something is missing beside what was found: it leaves more than noise does.")
+            said.append("Another effect is missing: the residuals exceed the noise.")
         if self.excused is not None:
             what = (
-                f"{' and '.join(self.excused)} as well" if self.excused else "what is left, or a part of this"
+                f"{' and '.join(self.excused)} as well"
+                if self.excused
+                else "the rest, or a part of the effects"
             )
             said.append(
-                f"Parameters of the camera were held, whose faults would explain {what}: leave all of them "
-                "free (camera=True)."
+                f"Parameters of the camera were fixed, and its errors would explain {what}: leave all of "
+                "them free (camera=True)."
             )
         if self.random:
             needed = ", ".join(f"{rate_of(m.state)} of {m.needed:.2g} {m.unit}".rstrip() for m in self.random)
             said.append(
-                "Forces that push at random, like those of a support that moves, explain this record about "
-                f"as well; beside what was found it still needs {needed}, r.m.s. over a frame."
+                "Random forcing (e.g. a moving support) explains this record about as well. With the added "
+                f"effects, random forcing of {needed}, r.m.s. over a frame, remains."
             )
         if any(effect.curve is not None for effect in self.effects):
             said += [
-                f"{one.name} is read in steps of {one.step:.3g} {one.unit}, coarser than its other noise: "
-                "such errors follow the motion, and a formula may be made of them."
-                for one in readings(self.fit)
-                if one.coarse
+                f"{reading.name} is read in steps of {reading.step:.3g} {reading.unit}, larger than its "
+                "other noise: such errors follow the motion, and may produce a formula."
+                for reading in readings(self.fit)
+                if reading.coarse
             ]
         if self.undetermined:
             said.append(
-                f"The data do not determine {', '.join(self.undetermined)}: each was held near its stated "
-                "value, give or take as much. Their numbers say little more than was stated."
+                f"The data do not determine {', '.join(self.undetermined)}: each was constrained to its "
+                "given value ± 100 %. Their fitted values carry little further information."
             )
         fixed = [name for name in self.baseline.parameters if name not in self.fit.parameters]
         if fixed:
             said.append(
-                f"Held as stated, because they run away where they are free: {', '.join(fixed)}. What was "
-                "found may make up for errors in these."
+                f"Fixed at their given values, because they diverge if they are free: {', '.join(fixed)}. "
+                "The added effects may compensate errors in these."
             )
         said += [
-            f"The record's {own.frames} frames were averaged over {own.every} at a time, to "
-            f"{int(own.measurement.seen.sum())}: the motion changes so slowly that nothing is lost by it."
-            for own in self.thinned
-            if own.every > 1
+            f"The record's {thin.frames} frames were averaged in blocks of {thin.every}, to "
+            f"{int(thin.measurement.seen.sum())}: the motion is so slow that no information is lost."
+            for thin in self.thinned
+            if thin.every > 1
         ]
         return said
 
     @cached_property
     def hints(self) -> list[NextExperiment]:
-        """What could be filmed to part the forms in doubt, the best first; worked out when asked for."""
+        """Films that would distinguish the forms in doubt, the best first; computed on first access."""
         return hints(self)
 
     @property
     def hint(self) -> NextExperiment | None:
-        """The best of them; None where nothing is in doubt."""
+        """The best of them; None if no form is in doubt."""
         return self.hints[0] if self.hints else None
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the discovery as JSON-ready values."""
         return {
             "verdict": self.verdict,
             "stopped": self.stopped,
             "remarks": self.remarks,
-            "noise": [vars(one) for one in self.noise],
-            "effects": [found.to_dict() for found in self.effects],
-            "alternatives": [other.to_dict() for other in self.alternatives],
-            "refused": [near.to_dict() for near in self.rejected],
+            "noise": [vars(reading) for reading in self.noise],
+            "effects": [effect.to_dict() for effect in self.effects],
+            "alternatives": [alternative.to_dict() for alternative in self.alternatives],
+            "refused": [effect.to_dict() for effect in self.rejected],
             "error_before": self.error_before.to_dict(),
             "error_after": self.error_after.to_dict(),
             "held_out_ratio": _named(self.ratio),
@@ -408,7 +419,7 @@ class Discovery:
         }
 
     def report(self, path: str | os.PathLike[str], **details: Any) -> Report:
-        """Write a page that a person reads: pictures first, one file. See :func:`udd.report.write`."""
+        """Write a page for readers, with pictures first, in one file. See :func:`udd.report.write`."""
         from udd.report import write
 
         return write(self, path, **details)

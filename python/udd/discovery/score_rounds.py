@@ -1,4 +1,4 @@
-"""One round of score tests around a fit: of the library, and of curves of any coordinate."""
+"""One round of score tests around a fit: of the library, and of curves over any coordinate."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from udd.fitting import Fit, beyond_schedule, with_larger_model_error
 from .thresholds import ALPHA
 from .trial_fits import price_of
 
-_LEADS = 2.0  # times the gain of the library's best; no two of its effects gain more together
-_LEADS_OFF_TRACK = 1.5  # where wrong effects of the library take minutes to fit
-_SCATTER = 3.0  # candidates are scored around a fit whose chi2 per degree of freedom is below this
+_LEADS = 2.0  # ratio to the gain of the library's best; no two of its effects gain more together
+# the same if the model is off track: wrong effects of the library then take minutes to fit
+_LEADS_OFF_TRACK = 1.5
+_SCATTER = 3.0  # chi2 per degree of freedom, below which candidates are scored around a fit
 
 
 @dataclass(frozen=True)
 class ScoreRound:
-    """What the scores around one fit say.
+    """Scores around one fit.
 
     Attributes
     ----------
     fit : Fit
     library : Scan
     curves : list of Curve
-        The likeliest first.
+        The most probable first.
     comparisons : int
-        How many scores could have been the best: the number of tests, by which Bonferroni's correction
-        multiplies each probability.
+        Count of scores that could have been the best: the number of tests for Bonferroni's correction.
     """
 
     fit: Fit
@@ -44,41 +44,41 @@ class ScoreRound:
 
     @property
     def off_track(self) -> bool:
-        """Whether the model follows the data only with more model error than the schedule has."""
+        """True if the model follows the data only with more model error than the schedule has."""
         return beyond_schedule(self.fit)
 
     def usable(self) -> list[Scored]:
-        """The candidates with physical numbers whose work no free parameter does, the strongest first."""
-        found = [s for s in self.library.scored if s.physical and not s.absorbed]
-        # Without the price of what a scan chose a free power comes before the law that is right.
+        """Return candidates with physical amplitudes that no free parameter absorbs, the strongest first."""
+        candidates = [s for s in self.library.scored if s.physical and not s.absorbed]
+        # Without the price of a scanned number a free power comes before the right law.
         price = price_of(self.fit)
-        return sorted(found, key=lambda s: -round(s.chi2 - price * s.candidate.scanned, 3))
+        return sorted(candidates, key=lambda s: -round(s.chi2 - price * s.candidate.scanned, 3))
 
     def passing(self) -> list[Scored]:
-        """Those of them that neither chance nor a film's faults explain."""
+        """Return usable candidates that neither chance nor a film's faults explain."""
         faults = self.fit.faults
         return [s for s in self.usable() if s.p * self.comparisons < ALPHA and s.chi2 > faults]
 
     def passing_curves(self) -> list[Curve]:
-        """The curves that neither chance nor a film's faults explain."""
+        """Return curves that neither chance nor a film's faults explain."""
         return [c for c in self.curves if c.p * self.comparisons < ALPHA and c.chi2 > self.fit.faults]
 
     def nats(self, scored: Scored) -> float:
-        """A candidate's gain over nothing, its parameters paid for, as a curve's evidence counts."""
+        """Return a candidate's gain in nats minus its parameters' price, as a curve's evidence."""
         return (scored.chi2 - scored.candidate.parameters * price_of(self.fit)) / 2
 
     def strongest(self) -> float:
-        """The gain of the best explanation."""
+        """Return the gain of the best explanation."""
         return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
 
     def curve_leads(self) -> bool:
-        """Whether a curve over one coordinate gains far more than every effect of the library."""
+        """Return True if a curve over one coordinate gains far more than every effect of the library."""
         best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
         leads = _LEADS_OFF_TRACK if self.off_track else _LEADS
         return best > leads * max(self._known(), 0.0) + EVIDENCE_MARGIN
 
     def _known(self) -> float:
-        """The gain of the library's best."""
+        """Return the gain of the library's best effect."""
         return max((self.nats(s) for s in self.library.scored if s.physical), default=-math.inf)
 
 
@@ -87,14 +87,14 @@ def score_round(
     given: Sequence[Candidate] = (),
     watched: Callable[[Callable[[Fit], ScoreRound]], Callable[[Fit], ScoreRound]] = lambda work: work,
 ) -> ScoreRound:
-    """Score every candidate and curve around the fit or, where that explains little, around a looser one.
+    """Score every candidate and curve around the fit; with more model error if it explains little.
 
-    A chaotic model that is wrong shows what it lacks only where it is held loosely: what scores high around a
-    tighter fit need not be what is missing. That one counts where the looser one shows nothing, as of few
-    data. Of other models both are scored, and the scores with the stronger explanation count: what dies down
-    slowly shows only where they are held tightly. Where the model needs more model error than the schedule
-    has, the looser one alone counts. `given` are the user's own candidates; `watched` makes work that does
-    not begin once a search's time is up.
+    A wrong chaotic model shows what it lacks only with a large model error: high scores around a tighter fit
+    may be misleading. The tighter fit counts if the looser one shows nothing, as with few data. For other
+    models both are scored, and the scores with the stronger explanation count: slow decays show only with a
+    small model error. If the model needs more model error than the schedule has, only the looser fit counts.
+    `given` are the user's own candidates; `watched` wraps work so that it does not start once a search's time
+    is up.
     """
 
     def score(current: Fit) -> ScoreRound:
@@ -109,30 +109,32 @@ def score_round(
     looser = with_larger_model_error(fitted, _SCATTER)
     alone = looser is fitted or beyond_schedule(looser)
     chaotic = fitted.model.profile.discovery.chaotic
-    found = parallel_map(watched(score), [looser] if alone or chaotic else [fitted, looser])
-    if not alone and chaotic and not (found[0].passing() or found[0].passing_curves()):
-        found.append(watched(score)(fitted))
-    return replace(max(found, key=ScoreRound.strongest), comparisons=sum(one.comparisons for one in found))
+    rounds = parallel_map(watched(score), [looser] if alone or chaotic else [fitted, looser])
+    if not alone and chaotic and not (rounds[0].passing() or rounds[0].passing_curves()):
+        rounds.append(watched(score)(fitted))
+    return replace(
+        max(rounds, key=ScoreRound.strongest), comparisons=sum(entry.comparisons for entry in rounds)
+    )
 
 
 def with_surfaces(scores: ScoreRound) -> ScoreRound:
-    """With the surfaces over two coordinates."""
-    found = scan_curves(scores.fit, only=lambda _slot, own: len(own) == 2, pairs=True)
-    curves = sorted(scores.curves + found.curves, key=lambda c: -c.evidence)
-    return replace(scores, curves=curves, comparisons=scores.comparisons + found.comparisons)
+    """Add the scores of surfaces over two coordinates."""
+    surfaces = scan_curves(scores.fit, only=lambda _slot, coords: len(coords) == 2, pairs=True)
+    curves = sorted(scores.curves + surfaces.curves, key=lambda c: -c.evidence)
+    return replace(scores, curves=curves, comparisons=scores.comparisons + surfaces.comparisons)
 
 
 def states_first(curves: list[Curve]) -> list[Curve]:
-    """The likeliest first, but after those as likely what stands for states in a roundabout way.
+    """Sort curves by evidence, with a penalty on coordinates that stand in for states.
 
-    Curves over time take up anything slow, and curves over the direction can do much of what those over Y
-    and Z do. A velocity without its momentum comes before the same with it.
+    Curves over time absorb anything slow, and curves over the direction can imitate those over Y and Z. A
+    velocity without its momentum comes before the same with it.
     """
 
     # Without this an uneven grip is written as a function of atan2(Y, Z), not of Y.
     def prior_penalty(curve: Curve) -> float:
-        own = curve.coordinates[0]
-        roundabout = 2 if own.name == "t" else 1 if own.angle and own.text != own.name else 0
+        coord = curve.coordinates[0]
+        roundabout = 2 if coord.name == "t" else 1 if coord.angle and coord.text != coord.name else 0
         return EVIDENCE_MARGIN * (roundabout + 0.5 * (curve.slot.momentum == "consistent"))
 
     return sorted(curves, key=lambda c: -c.evidence + prior_penalty(c))

@@ -23,37 +23,37 @@ from udd.fitting.solve import SolveError, solve
 from udd.measurement import Measurement
 from udd.models import Model
 
-#: Chance that a term that is not there is kept, over all terms together.
+#: Probability of keeping a superfluous term, over all terms together.
 ALPHA = 1e-3
-_FAR = -6.0  # terms that better the criterion by so much by going do so several at a time
+_FAR = -6.0  # change of the criterion below which terms are removed several at a time
 _EQUAL = 1e-3  # in the criterion
-_LOOSE = 1  # place in the schedule of a fit that a wrong model has not bent
-_NEARLY = 3  # steps towards a fit that only has to tell whether it is worth while
-_TRIED = 3  # of the terms left out, put back in turn to see whether another can go instead
-_HOPELESS = 20.0  # in the criterion, beyond what an estimate to first order may be off
-_ROUNDS = 8  # of such exchanges
+_LOOSE = 1  # schedule level of a fit that a wrong model does not distort
+_NEARLY = 3  # steps of a fit that only shows whether a term is worth while
+_TRIED = 3  # removed terms that are restored in turn, to see whether another can be removed instead
+_HOPELESS = 20.0  # margin in the criterion for the error of a first-order estimate
+_ROUNDS = 8  # maximum of such exchanges
 
 
 @dataclass(frozen=True)
 class Pruned:
-    """A model with the terms that the data need.
+    """Model with the terms that the data need.
 
     Attributes
     ----------
     fit : Fit
-        The others are held at zero.
+        Fit with the other terms fixed at zero.
     full : Fit
-        With all of them.
+        Fit with all terms.
     kept, removed : list of str
         Names of the parameters.
     rise : dict of str to float
-        For each that was kept, by how much chi2 would rise without it.
+        For each kept term, the increase in chi2 without it.
     price : float
-        What a parameter has to be worth, in chi2; with a `spread` beside what its prior makes it cost.
+        Required gain of a parameter, in chi2; with a `spread` in addition to the cost by its prior.
     undetermined : list of str
-        Those of `removed` that the data do not determine beside the terms named before them: on the orbit
-        they are combinations of these, so that they may as well stand in their place. A constant of the
-        motion makes such terms.
+        Those of `removed` that the data do not determine together with the terms named before them: on the
+        orbit they are linear combinations of these, and could replace them. A constant of the motion causes
+        such terms.
     """
 
     fit: Fit
@@ -66,11 +66,11 @@ class Pruned:
 
     @property
     def model(self) -> Model:
-        """The fitted model; parameters that were left out are zero."""
+        """The fitted model; removed parameters are zero."""
         return self.fit.model
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the result as JSON-ready values."""
         return {
             "kept": {name: {"rise": self.rise[name]} for name in self.kept},
             "removed": self.removed,
@@ -93,44 +93,49 @@ def prune(
     alpha: float = ALPHA,
     progress: Progress = None,
 ) -> Pruned:
-    """Backward elimination of a model's terms, with exchanges.
+    """Eliminate a model's needless terms backward, with exchanges.
 
     All free parameters are fitted together. The term that matters least is fixed at zero and the rest are
-    refitted, as long as the criterion falls. This is done from a fit with a small model error and from one
-    with a large one; the better end is kept. Then each term that was removed is put back in turn, to see
+    refitted, as long as the criterion decreases. This is done from a fit with a small model error and from
+    one with a large one, and the better end is kept. Then each removed term is restored in turn, to see
     whether another can be removed instead.
 
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
     model : Model, or a sequence of them
-        Its terms have factors among the parameters; where a factor is zero the term is not there.
+        Its terms have factors among the parameters; a term with factor zero is absent.
     among : iterable of str, optional
-        The parameters that may go; by default all that are free.
+        Parameters that may be removed; default: all free ones.
     free, priors
         As for :func:`udd.fit`.
     spread : float, optional
-        How large the factors may well be, in the user's units: the standard deviation of their prior around
-        zero. Sets of terms are then compared by their evidence, for each term less the logarithm of their
-        number; of two sets that explain the data equally well, that wins whose factors need to be known less
-        precisely, mostly that of the lower powers. By default every term is priced alike.
+        Typical size of the factors, in the user's units: the standard deviation of their prior around zero.
+        Sets of terms are then compared by their evidence, minus the log count of terms for each of them. If
+        two sets explain the data equally well, the one whose factors need less precision wins, usually that
+        of the lower powers. By default every term has the same price.
     alpha : float
-        Without a `spread`, the chance that a term that is not there is kept, over all of them together.
+        Without a `spread`, the probability of keeping a superfluous term, over all of them together.
     progress : bool or callable, optional
-        True or None: show what is being done; False: nothing. A function gets it in words.
+        True or None shows the current stage, False nothing. A function is called with it as text.
 
     Returns
     -------
     Pruned
+        `model` is the reduced model; `kept`, `removed` and `rise` say which terms it has and why.
 
     Raises
     ------
     FitError
-        The model cannot be fitted, or a name is not a free parameter's.
+        The model cannot be fitted, or a name is not a free parameter.
+
+    See Also
+    --------
+    discover : find missing terms.
 
     Examples
     --------
-    A swing with every power of its speed up to the third; only the first is there.
+    A swing with every power of its speed up to the third; the true model has only the first.
 
     >>> import numpy as np, udd
     >>> t = np.arange(0, 30, 0.05)
@@ -146,22 +151,24 @@ def prune(
     tell("fitting all terms together")
     measurement = continuous(measurement, model)
     record = record_of(measurement, model)
-    own = model if isinstance(model, Model) else next(iter(model))
-    known = list(own.parameters if free is None else free)
-    names = known if among is None else list(among)
+    first_model = model if isinstance(model, Model) else next(iter(model))
+    free_names = list(first_model.parameters if free is None else free)
+    names = free_names if among is None else list(among)
     for name in names:
-        if name not in known:
-            raise FitError(f"{name!r} is not a free parameter of the model; there are {', '.join(known)}")
+        if name not in free_names:
+            raise FitError(
+                f"{name!r} is not a free parameter of the model; choose from {', '.join(free_names)}"
+            )
     if not 0.0 < alpha < 1.0:
-        raise FitError(f"alpha is a chance between 0 and 1, not {alpha!r}")
+        raise FitError(f"alpha must be a probability between 0 and 1, not {alpha!r}")
     if spread is not None:
         if not 0.0 < spread < np.inf:
             raise FitError(f"spread must be above 0 and finite, not {spread!r}")
         priors = dict.fromkeys(names, (0.0, spread)) | dict(priors or {})
-    full, undetermined = _determined(measurement, record, model, known, names, priors or {})
+    full, undetermined = _determined(measurement, record, model, free_names, names, priors or {})
     if undetermined:
         tell(f"not determined: {', '.join(undetermined)}")
-    # Among n terms about one is expected to be needed, or each is priced against chance.
+    # About one of n terms is expected to be needed; or each has a price against chance.
     n = max(len(names), 1)
     price = 2 * math.log(n) if spread is not None else float(chi_squared.isf(alpha / n, 1))
     pruning = _Pruning([name for name in names if name not in undetermined], price, spread, full, tell)
@@ -180,18 +187,18 @@ def _determined(
     names: Sequence[str],
     priors: Mapping[str, tuple[float, float]],
 ) -> tuple[Fit, list[str]]:
-    """The fit of all terms that the data determine together, and the names of the others.
+    """Fit all terms that the data determine together; also name the others.
 
-    Of terms that can change together without changing the fit the last one goes, until there are none.
+    If terms can change together without changing the fit, the last one is removed, until none can.
     """
     gone: list[str] = []
     while True:
-        left = [name for name in free if name not in gone]
-        own = {name: prior for name, prior in priors.items() if name not in gone}
+        remaining = [name for name in free if name not in gone]
+        kept_priors = {name: prior for name, prior in priors.items() if name not in gone}
         try:
-            return fit_record(measurement, record, model, left, priors=own, each=(), search=True), [
-                name for name in names if name in gone
-            ]
+            return fit_record(
+                measurement, record, model, remaining, priors=kept_priors, each=(), search=True
+            ), [name for name in names if name in gone]
         except SolveError as error:
             last = [name for name in names if name in error.undetermined]
             if not last:
@@ -202,25 +209,25 @@ def _determined(
 
 
 class _Pruning:
-    """The search for the likeliest set of terms."""
+    """Search for the most probable set of terms."""
 
     def __init__(
         self, names: list[str], price: float, spread: float | None, full: Fit, tell: Callable[[str], object]
     ) -> None:
         self.names, self.price, self.spread, self.full, self.tell = names, price, spread, full, tell
-        # One unit for all: divided by its own scatter any chi2 is just the degrees of freedom.
+        # One unit for all: in units of its own scatter every chi2 equals its degrees of freedom.
         self.unit = max(full.scatter, 1.0)
 
     def run(self) -> Fit:
-        """Leave out, hold the rest more tightly, exchange; from a tight fit and from a loose one.
+        """Remove terms, reduce the model error, exchange; from a small and from a large model error.
 
-        The two leave terms out in another order, and where two sets of terms do nearly the same the order
-        decides.
+        The two remove terms in a different order, which decides between sets of terms that are almost
+        equivalent.
         """
         ends = []
         for level in dict.fromkeys((self.full.level, min(self.full.level, _LOOSE))):
             current, last = at_level(self.full, level), -1
-            # Where a model with all its terms cannot be held tightly one with fewer can.
+            # With fewer terms a smaller model error may be possible.
             while current.level > last:
                 last = current.level
                 current = self._tightened(self._without(current, gently=True))
@@ -235,7 +242,7 @@ class _Pruning:
         return current
 
     def rises(self, fitted: Fit) -> dict[str, float]:
-        """By how much chi2 would rise without each of the terms that are left, to first order."""
+        """Return the increase in chi2 without each of the kept terms, to first order."""
         return {
             name: (fitted.parameters[name] / fitted.errors[name]) ** 2 / self.unit
             for name in self.names
@@ -243,13 +250,13 @@ class _Pruning:
         }
 
     def criterion(self, fitted: Fit) -> float:
-        """The smaller the better: chi2 with the price of the terms, or minus twice the evidence."""
+        """Return the criterion to minimise: chi2 plus the price of the terms, or minus twice the evidence."""
         if self.spread is not None:
             return -2.0 * fitted.evidence + self.price * len(fitted.parameters)
         return fitted.chi2 / self.unit + self.price * len(fitted.parameters)
 
     def _change(self, fitted: Fit, gone: list[int]) -> float:
-        """By how much the criterion would change without some parameters, to first order."""
+        """Return the change of the criterion without some parameters, to first order."""
         a = np.array(list(fitted.parameters.values()))[gone]
         block = fitted.covariance[np.ix_(gone, gone)]
         rise = float(a @ np.linalg.solve(block, a))
@@ -262,9 +269,9 @@ class _Pruning:
         return reduce_model_error(fitted.measurements, fitted.problem, fitted.point, schedule)
 
     def _without(self, current: Fit, gently: bool = False, kept: str | None = None) -> Fit:
-        """Leave out terms as long as that is for the better, several at a time while it is by far.
+        """Remove terms as long as that decreases the criterion, several at a time while it does by far.
 
-        Gently: only those that hardly matter. One may have to be kept.
+        With `gently` only terms that hardly matter are removed. `kept` is a term to keep.
         """
         needed = set() if kept is None else {kept}
         while True:
@@ -290,21 +297,21 @@ class _Pruning:
         return self.criterion(after) - self.criterion(before) < by
 
     def _order(self, fitted: Fit, kept: str | None = None) -> list[tuple[str, float]]:
-        """The terms but one in the order in which they would go, with what each does to the criterion."""
+        """Rank the terms but one in order of removal, with the change of the criterion by each."""
         free = list(fitted.parameters)
-        left = [free.index(name) for name in self.names if name in fitted.parameters and name != kept]
+        remaining = [free.index(name) for name in self.names if name in fitted.parameters and name != kept]
         gone: list[int] = []
         result, total = [], 0.0
-        while left:
-            changes = [self._change(fitted, [*gone, k]) for k in left]
+        while remaining:
+            changes = [self._change(fitted, [*gone, k]) for k in remaining]
             k = int(np.argmin(changes))
-            result.append((free[left[k]], changes[k] - total))
+            result.append((free[remaining[k]], changes[k] - total))
             total = changes[k]
-            gone.append(left.pop(k))
+            gone.append(remaining.pop(k))
         return result
 
     def _fixed_at_zero(self, fitted: Fit, gone: Iterable[str]) -> Fit | None:
-        """The fit with these parameters held at zero, from where it is expected to end."""
+        """Fit with these parameters fixed at zero, starting at the expected end."""
         gone = list(gone)
         names = list(fitted.parameters)
         out = [names.index(name) for name in gone]
@@ -314,7 +321,7 @@ class _Pruning:
         return self._again(fitted, tuple(f for f in fitted.problem.free if f.name not in gone), start)
 
     def _with(self, fitted: Fit, name: str, amplitude: float) -> Fit | None:
-        """The fit with a parameter free that was held at zero."""
+        """Fit with a parameter free that was fixed at zero."""
         free = tuple(f for f in self.full.problem.free if f.name == name or f.name in fitted.parameters)
         return self._again(fitted, free, {name: amplitude}, _NEARLY)
 
@@ -337,7 +344,7 @@ class _Pruning:
             return None
 
     def _exchanged(self, current: Fit) -> Fit | None:
-        """A better set of terms, found by putting one back and leaving out others."""
+        """Return a better set of terms, with one restored and others removed; None if there is none."""
         fixed = [
             f for f in self.full.problem.free if f.name in self.names and f.name not in current.parameters
         ]
@@ -346,16 +353,17 @@ class _Pruning:
         gradient, information, _alone = _core.score(
             current.problem.at(current.point), [(current.model, [f.index]) for f in fixed]
         )
-        own = np.maximum(np.diag(information), 1e-300)
-        # With each one in turn, nearly fitted: what could go then?
+        diagonal = np.maximum(np.diag(information), 1e-300)
+        # With each one in turn, nearly fitted, estimate which terms can be removed.
         wider = [
-            (f.name, self._with(current, f.name, g / i)) for f, g, i in zip(fixed, gradient, own, strict=True)
+            (f.name, self._with(current, f.name, g / i))
+            for f, g, i in zip(fixed, gradient, diagonal, strict=True)
         ]
         hopes = [(self._hope(more, name), name, more) for name, more in wider if more is not None]
         for hope, name, more in sorted(hopes, key=lambda h: h[0])[:_TRIED]:
             if hope > self.criterion(current) + _HOPELESS:
                 break
-            # The one put back would be the first to go.
+            # The restored term would be the first to be removed.
             after = self._tightened(self._without(self._without(more, kept=name)))
             level = min(after.level, current.level)
             if self.criterion(at_level(after, level)) < self.criterion(at_level(current, level)) - _EQUAL:
@@ -364,7 +372,7 @@ class _Pruning:
         return None
 
     def _hope(self, fitted: Fit, kept: str) -> float:
-        """The criterion without the terms that are not needed beside one, to first order."""
+        """Estimate the criterion without the terms that are needless together with one, to first order."""
         total = least = 0.0
         for _name, change in self._order(fitted, kept):
             total += change

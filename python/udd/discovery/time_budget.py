@@ -1,4 +1,4 @@
-"""How long a search may take."""
+"""Time limit of a search."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ To = TypeVar("To")
 
 
 class TimeUpError(Exception):
-    """The time that a search was given is over; no fault of a model, which an attempt would survive."""
+    """Signal that the time of a search is over; no fault of a model, so an attempt must not catch it."""
 
 
 class Clock:
-    """The time that a search has, and what it is doing.
+    """Time limit of a search, and its current activity.
 
     Parameters
     ----------
     budget : float or None
-        s from now; None for as long as it takes.
+        s from now; None for no limit.
     tell : callable
-        Told in a few words what is being done.
+        Called with a short description of each stage.
 
     Raises
     ------
     FitError
-        The budget is no positive number.
+        The budget is not a positive number.
     """
 
     def __init__(self, budget: float | None, tell: Callable[[str], object]) -> None:
@@ -43,18 +43,18 @@ class Clock:
         self.end, self._tell, self.doing = time.monotonic() + self.budget, tell, ""
 
     def tell(self, text: str) -> None:
-        """Begin something, unless the time is up."""
+        """Report the next stage, unless the time is up."""
         self.doing = text
         self.check()
         self._tell(text)
 
     def trying(self, titles: Sequence[str]) -> None:
-        """Begin to fit proposals, if there are any, unless the time is up."""
+        """Report the fits of proposals, if any, unless the time is up."""
         if titles:
             self.tell(f"trying {titles[0]}" + (f" and {len(titles) - 1} more" if titles[1:] else ""))
 
     def finish(self, text: str) -> None:
-        """Begin something that is done in any case."""
+        """Report a stage that runs in any case."""
         self._tell(text)
 
     def check(self) -> None:
@@ -63,7 +63,7 @@ class Clock:
             raise TimeUpError(self.doing)
 
     def watched(self, work: Callable[[From], To]) -> Callable[[From], To]:
-        """The same work, which does not begin once the time is up."""
+        """Wrap work so that it does not start once the time is up."""
 
         def checked(piece: From) -> To:
             self.check()
@@ -72,5 +72,5 @@ class Clock:
         return checked
 
     def each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
-        """Independent pieces of work side by side, as long as there is time."""
+        """Run independent pieces of work in parallel while there is time."""
         return parallel_map(self.watched(work), pieces)

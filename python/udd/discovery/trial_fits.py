@@ -23,40 +23,40 @@ from .thresholds import ALPHA
 
 
 def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
-    """Whether the amplitudes of an effect are beyond chance beside all else that is free (Wald's test)."""
+    """Return True if an effect's amplitudes are significant with everything else free (Wald's test)."""
     order = list(fitted.parameters)
-    own = [order.index(name) for name in names]
+    indices = [order.index(name) for name in names]
     a = np.array([fitted.parameters[name] for name in names])
-    block = fitted.covariance[np.ix_(own, own)] * fitted.shown
-    if np.linalg.matrix_rank(block) < len(own):
-        return False  # its amplitudes trade for each other: it says less than it has numbers
-    return bool(a @ np.linalg.solve(block, a) >= chi_squared.isf(ALPHA, len(own)))
+    block = fitted.covariance[np.ix_(indices, indices)] * fitted.shown
+    if np.linalg.matrix_rank(block) < len(indices):
+        return False  # its amplitudes are collinear: fewer directions are identifiable than it has parameters
+    return bool(a @ np.linalg.solve(block, a) >= chi_squared.isf(ALPHA, len(indices)))
 
 
 def price_of(fitted: Fit) -> float:
-    """What a parameter costs, in chi2 (BIC)."""
+    """Return the price of a parameter, in chi2 (BIC)."""
     return math.log(fitted.observations)
 
 
 @dataclass(frozen=True)
 class TrialFit:
-    """A proposal fitted in full: candidates with free amplitudes, a located curve, or a formula for one.
+    """Full fit of a proposal: candidates with free amplitudes, a located curve, or a formula for one.
 
     Attributes
     ----------
     candidates : list of Candidate
-        The effects, as they were proposed.
+        The effects as proposed.
     fit : Fit
     names : list of str
-        The parameters that came in with it.
+        Parameters that the proposal adds.
     price : float
-        What its freedom costs, in chi2 (BIC).
+        Price of its freedom, in chi2 (BIC).
     freedom : float
-        How many numbers were found for it.
+        Count of estimated numbers.
     curve : Curve or None
-        What was located.
+        The located curve.
     formula : Formula or None
-        What the curve is written as.
+        Its formula.
     """
 
     candidates: list[Candidate]
@@ -69,33 +69,33 @@ class TrialFit:
 
     @property
     def amplitudes(self) -> list[float]:
-        """The fitted values of these parameters."""
+        """Fitted values of the added parameters."""
         return [self.fit.parameters[name] for name in self.names]
 
     @property
     def rank(self) -> tuple[int, float]:
-        """Order of several: what is held more tightly comes first, then what has the smaller chi2."""
+        """Sort key: the smallest model error first, then the smallest chi2."""
         return -self.fit.level, self.fit.chi2
 
     @property
     def is_curve(self) -> bool:
-        """Whether it is a curve without a formula."""
+        """True for a curve without a formula."""
         return self.curve is not None and self.formula is None
 
     @property
     def needed(self) -> bool:
-        """Whether each of several candidates is needed beside the others."""
+        """True if each of several candidates is significant in addition to the others."""
         return len(self.candidates) < 2 or all(
             needed_in(self.fit, c.amplitude_names) for c in self.candidates
         )
 
     @property
     def physical(self) -> bool:
-        """Whether all amplitudes lie in their ranges, and a pendulum's own friction still brakes."""
+        """True if all amplitudes are in their ranges, and a pendulum's own friction still brakes."""
         values, errors = self.fit.parameters, self.fit.errors
         brakes = [name for name in self.fit.model.profile.discovery.brakes if name in values]
         if any(values[name] < -2 * errors[name] for name in brakes):
-            return False  # two forms that take from each other what a third would do alone
+            return False  # two forms that cancel partly; a third would explain the sum alone
         if self.curve is not None:
             return True
         return all(
@@ -107,9 +107,9 @@ class TrialFit:
 def of_library(
     current: Fit, candidates: list[Candidate], start: list[float], goal: Goal | None = None
 ) -> TrialFit | None:
-    """Effects of the library with free amplitudes.
+    """Fit effects of the library with free amplitudes.
 
-    None where they cannot be fitted, or explain less than the `goal` asks.
+    Return None if the fit fails, or explains less than the `goal` requires.
     """
     try:
         fitted = extend(current, [c.effect for c in candidates], start, goal or Goal(current.level))
@@ -122,22 +122,22 @@ def of_library(
 
 
 def from_none(current: Fit, candidates: list[Candidate], goal: Goal | None = None) -> TrialFit | None:
-    """Effects of the library with free amplitudes that start at zero."""
+    """Fit effects of the library with free amplitudes that start at zero."""
     return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates), goal)
 
 
 def with_more(
     current: Fit, first: TrialFit, candidates: list[Candidate], goal: Goal | None = None
 ) -> TrialFit | None:
-    """Effects of the library, one of which was fitted already, from where that fit ended."""
+    """Fit effects of the library, one of which was fitted already, from where that fit ended."""
     start = started_at(current, first.fit)
-    known = first.fit.parameters
-    amplitudes = [known.get(name, 0.0) for c in candidates for name in c.amplitude_names]
+    values = first.fit.parameters
+    amplitudes = [values.get(name, 0.0) for c in candidates for name in c.amplitude_names]
     return of_library(start, candidates, amplitudes, goal)
 
 
 def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
-    """A curve, located in full."""
+    """Fit a curve in full."""
     try:
         kind = "curve" if len(curve.coordinates) == 1 else "surface"
         located = fit_curve(current, curve, _unused(current, kind))
@@ -151,12 +151,13 @@ def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
 
 
 def _excess(current: Fit, curve: Curve) -> float:
-    """What a curve pays, in chi2, for values beyond what the motion can show: all rates there are.
+    """Return a curve's penalty, in chi2, for values beyond the largest observed rates.
 
-    Its prior is as wide as these; wider by a factor costs that factor's logarithm for each number found.
+    Its prior has their width. A curve wider by a factor pays the factor's logarithm for each estimated
+    number.
     """
     if not isinstance(current.model, FormulaModel):
-        return 0.0  # whose curves the disk's own tests keep within bounds
+        return 0.0  # the disk's own tests limit its curves
     model, linked = current.model, current.record.linked
     rates = np.diff(current.states, axis=0)[linked] / np.diff(current.record.t)[linked, None]
     shown = rates[:, model.state_names.index(curve.slot.equation)]
@@ -170,7 +171,7 @@ def _excess(current: Fit, curve: Curve) -> float:
 
 
 def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None = None) -> TrialFit | None:
-    """A formula for a curve, all its constants free; None as for effects of the library."""
+    """Fit a formula for a curve, all its constants free; None as in :func:`of_library`."""
     name = _unused(current, "formula")
     try:
         fitted = fit_formula(current, curve, written, name, goal)
@@ -184,21 +185,21 @@ def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None =
 
 
 def fitted_ones(trials: list[TrialFit | None]) -> list[TrialFit]:
-    """Those that could be fitted."""
+    """Drop failed fits."""
     return [t for t in trials if t]
 
 
 def one_of_each(trials: list[TrialFit]) -> list[TrialFit]:
-    """The best of those that tried one effect with several values of a shape that a fit then found."""
-    found: dict[object, TrialFit] = {}
+    """Keep the best of the trials of one effect that started at different values of a free shape."""
+    best: dict[object, TrialFit] = {}
     for trial in sorted(trials, key=lambda t: t.rank):
         effect = trial.candidates[0].effect
         fixed = [effect.parameters[p.name] for p in effect.spec.parameters if not p.sought]
-        found.setdefault((effect.name, effect.momentum, *fixed), trial)
-    return [trial for trial in trials if trial in found.values()]
+        best.setdefault((effect.name, effect.momentum, *fixed), trial)
+    return [trial for trial in trials if trial in best.values()]
 
 
 def _unused(current: Fit, name: str) -> str:
-    """A name that no effect of the model has yet."""
+    """Return an unused name for an effect of the model."""
     taken = {effect.name for effect in current.model.effects}
     return next(n for n in (name, *(f"{name}{k}" for k in range(2, 9))) if n not in taken)

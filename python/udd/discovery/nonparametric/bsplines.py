@@ -13,16 +13,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spline:
-    """The basis along one coordinate.
+    """B-spline basis along one coordinate.
 
     Attributes
     ----------
     low, high : float
-        Where the knots begin and end; beyond, a curve keeps its end value.
+        First and last knot; beyond them a curve is constant.
     intervals : int
-        Between knots.
+        Count of intervals between knots.
     periodic : bool
-        Whether `high` is `low` again.
+        True if `high` is the same place as `low`.
     """
 
     low: float
@@ -32,16 +32,16 @@ class Spline:
 
     @property
     def size(self) -> int:
-        """The number of basis functions."""
+        """Count of basis functions."""
         return self.intervals if self.periodic else self.intervals + 3
 
     @property
     def step(self) -> float:
-        """The distance of knots."""
+        """Distance between knots."""
         return (self.high - self.low) / self.intervals
 
     def design(self, x: Array, derivative: int = 0) -> Array:
-        """The basis functions, or their derivatives, at places; one more axis, of length `size`."""
+        """Evaluate the basis functions, or their derivatives, at places; the last axis has length `size`."""
         knots = self.low + self.step * np.arange(-3, self.intervals + 4)
         inside = self._inside(x)
         functions = BSpline(knots, np.eye(self.intervals + 3), 3)
@@ -62,29 +62,29 @@ class Spline:
 
     @property
     def roughness(self) -> Array:
-        """The matrix whose quadratic form sums the squared second differences of the coefficients."""
+        """Matrix whose quadratic form sums the squared second differences of the coefficients."""
         if self.periodic:
-            one = np.eye(self.size)
-            second = np.roll(one, 1, axis=1) - 2 * one + np.roll(one, -1, axis=1)
+            identity = np.eye(self.size)
+            second = np.roll(identity, 1, axis=1) - 2 * identity + np.roll(identity, -1, axis=1)
         else:
             second = np.diff(np.eye(self.size), 2, axis=0)
         result: Array = second.T @ second
         return result
 
     def values(self, coefficients: Array, x: Array) -> Array:
-        """The curve of these coefficients at places."""
+        """Evaluate the curve with these coefficients at places."""
         result: Array = self.design(x) @ coefficients
         return result
 
     def full(self, coefficients: Array) -> Array:
-        """The coefficients as a spline that knows no period takes them, `intervals + 3` of them."""
+        """Return the coefficients for a spline without a period, `intervals + 3` of them."""
         return np.concatenate([coefficients, coefficients[:3]]) if self.periodic else coefficients
 
 
 def along(x: Array, angle: bool, intervals: int) -> Spline:
-    """The basis for the places that a record visits.
+    """Make the basis for the places that a record visits.
 
-    An angle is periodic where the places go all the way round.
+    An angle is periodic if the places cover the whole turn.
     """
     if angle:
         turned = np.sort(np.mod(x, 2 * np.pi).ravel())
@@ -97,12 +97,12 @@ def along(x: Array, angle: bool, intervals: int) -> Spline:
 
 
 def product(a: Array, b: Array) -> Array:
-    """Every product of a column of one design with a column of another."""
+    """Multiply every column of one design by every column of another."""
     result: Array = (a[..., :, None] * b[..., None, :]).reshape(*a.shape[:-1], -1)
     return result
 
 
 def rough_product(a: Spline, b: Spline) -> Array:
-    """The roughness of a surface: of both directions."""
+    """Return the roughness matrix of a surface, summed over both directions."""
     result: Array = np.kron(a.roughness, np.eye(b.size)) + np.kron(np.eye(a.size), b.roughness)
     return result

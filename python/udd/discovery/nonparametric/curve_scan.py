@@ -1,4 +1,4 @@
-"""Score tests of penalised splines: in which equation something is missing, as a function of what."""
+"""Score tests of penalised splines: which equation lacks a term, and in which coordinate."""
 
 from __future__ import annotations
 
@@ -22,45 +22,50 @@ from .penalized_curves import Confounding, chance, smooth
 
 Array = NDArray[np.float64]
 
-#: Explanations whose likelihoods differ by less, in units of their logarithm, are not told apart.
+#: Difference in log evidence (nats) below which explanations are not distinguished.
 EVIDENCE_MARGIN = 10.0
 #: Intervals between knots along one coordinate, and along each of two.
 INTERVALS, INTERVALS_OF_TWO = 14, 3
-#: The same along an angle that goes round: five waves per turn are seen.
+#: The same along a periodic angle: it resolves five waves per turn.
 ROUND, ROUND_OF_TWO = 24, 6
-_FINER = 2  # times as many knots for the curve that is kept
-_FEW = 6  # of the best curves, tried with the momentum that goes with them too
+_FINER = 2  # factor in the number of knots for the curve that is kept
+_FEW = 6  # best curves, which are also tried with the momentum that goes with them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve(OneLine):
-    """A curve that one equation may lack, with the evidence for it.
+    """Curve that one equation may lack, with the evidence for it.
 
     Attributes
     ----------
     slot : Slot
-        Where it enters.
+        Equation that it enters.
     coordinates : tuple of Coordinate
-        What it is a function of, one or two.
+        Coordinates that it depends on, one or two.
     splines : tuple of Spline
     coefficients : ndarray (k,)
-        Of the splines, under the smoothness prior; SI units.
+        Spline coefficients under the smoothness prior; SI units.
     covariance : ndarray (k, k)
     precision : float
-        Of the smoothness prior, chosen by evidence.
+        Precision of the smoothness prior, chosen by evidence.
     df : float
         Effective degrees of freedom.
     evidence : float
-        Logarithm of the evidence over that for no curve, nats.
+        Log evidence relative to no curve, nats.
     p : float
-        Probability that the best of the numbers of directions looks so good by chance, for this curve alone.
+        Probability of so large a decrease in chi2 by chance, for this curve alone and the best number of
+        directions.
     chi2, directions : float, int
-        By how much chi2 would fall in that many directions.
+        Decrease in chi2 in that many directions.
     places : tuple of ndarray
-        Where the record visits the coordinates, every frame's first place.
+        Places of the coordinates that the record visits: every frame's first.
     score : Score
     absorbed : Confounding or None
-        What of it is agreed upon, where `covariance` is what remains then.
+        Confounded part, if `covariance` is that of the rest; else None.
+
+    See Also
+    --------
+    udd.plot.curve : draw it with its band.
     """
 
     slot: Slot
@@ -80,31 +85,31 @@ class Curve(OneLine):
 
     @property
     def title(self) -> str:
-        """What a reader calls it."""
+        """Name of the curve for a reader."""
         return f"{self.slot.title} as a function of {' and '.join(c.name for c in self.coordinates)}"
 
     @property
     def name(self) -> tuple[str, ...]:
-        """Slot, momentum and coordinates, to compare by."""
+        """Slot, momentum and coordinates, for comparison."""
         return (self.slot.title, *(c.name for c in self.coordinates))
 
     @property
     def kin(self) -> tuple[str, ...]:
-        """Slot and coordinates: what is the same with its momentum and without."""
-        return _kin(self.slot, self.coordinates)
+        """Slot and coordinates, without the momentum, for comparison."""
+        return _key(self.slot, self.coordinates)
 
     def design(self, *x: Array) -> Array:
-        """The basis functions at places, (..., k)."""
+        """Evaluate the basis functions at places, (..., k)."""
         designs = [s.design(np.asarray(v, dtype=np.float64)) for s, v in zip(self.splines, x, strict=True)]
         return designs[0] if len(designs) == 1 else product(*designs)
 
     def values(self, *x: Array) -> Array:
-        """The curve at places, in the slot's unit."""
+        """Evaluate the curve at places, in the slot's unit."""
         result: Array = self.design(*x) @ self.coefficients
         return result
 
     def errors(self, *x: Array) -> Array:
-        """Standard errors of the curve at places."""
+        """Compute standard errors of the curve at places."""
         design = self.design(*x)
         result: Array = np.sqrt(
             np.maximum(np.einsum("...k,kl,...l->...", design, self.covariance, design), 0.0)
@@ -112,30 +117,30 @@ class Curve(OneLine):
         return result
 
     def beside(self, values: Array, *x: Array) -> Array:
-        """Another curve's values at places, as they compare: with as much of what is agreed upon as this."""
+        """Align another curve's values with this one in the confounded directions, for comparison."""
         if self.absorbed is None:
             return values
         design = self.design(*x)
         weak = 1e-9 * np.trace(design.T @ design) / np.trace(self.roughness) * self.roughness
-        own = np.linalg.solve(design.T @ design + weak, design.T @ values)
-        result: Array = values + design @ (self.absorbed.aligned(own, self.coefficients) - own)
+        projection = np.linalg.solve(design.T @ design + weak, design.T @ values)
+        result: Array = values + design @ (self.absorbed.aligned(projection, self.coefficients) - projection)
         return result
 
     @property
     def roughness(self) -> Array:
-        """What the smoothness prior charges."""
+        """Matrix of the smoothness prior."""
         return _roughness(self.splines)
 
 
 @dataclass(frozen=True)
 class CurveScan:
-    """Every curve that was tried, the one with the highest evidence first.
+    """All curves that were tried, the one with the highest evidence first.
 
     Attributes
     ----------
     curves : list of Curve
     comparisons : int
-        How many curves could have been the best.
+        Count of curves that could have been the best.
     """
 
     curves: list[Curve]
@@ -143,7 +148,7 @@ class CurveScan:
 
     @property
     def p(self) -> float:
-        """Probability that any of them looks as good as the least likely one by chance."""
+        """Probability that any of them fits so well by chance."""
         return min(min((c.p for c in self.curves), default=1.0) * self.comparisons, 1.0)
 
 
@@ -155,21 +160,26 @@ def scan_curves(
 ) -> CurveScan:
     """Score a smooth curve in every equation as a function of every coordinate.
 
-    Around the fit, with everything else optimal. Curves are cubic B-splines whose second differences are held
-    small; how small, the evidence says. What the free parameters do already counts for nothing.
+    The score is computed around the fit, with everything else optimal. Curves are cubic B-splines with a
+    prior on their second differences, whose precision is chosen by evidence. Confounding with the free
+    parameters is accounted for.
 
     Parameters
     ----------
     fit : Fit
     pairs : bool
-        Surfaces over two coordinates as well.
+        True to include surfaces over two coordinates.
     only : callable, optional
-        ``(slot, coordinates) -> bool``: which of them to try.
+        ``(slot, coordinates) -> bool``: filter of the curves to try.
+
+    Returns
+    -------
+    CurveScan
 
     Examples
     --------
-    A pendulum in air, whose model knows viscous friction only; a wrong model that is held loosely shows best
-    what it lacks.
+    A pendulum in air, whose model has viscous friction only. With a large model error the scores show best
+    what a wrong model lacks.
 
     >>> import numpy as np, udd
     >>> from udd.discovery.nonparametric.curve_scan import scan_curves
@@ -182,75 +192,77 @@ def scan_curves(
     >>> scan_curves(with_larger_model_error(fit, 3.0)).curves[0].title
     'friction as a function of |Omega|'
     """
-    found = responses(fit)
+    moved = responses(fit)
     groups = [
-        (slot, own)
+        (slot, coords)
         for slot in slots(fit.model)
-        for own in _choices(fit.model, pairs)
-        if _sensible(slot, own) and (only is None or only(slot, own))
+        for coords in _choices(fit.model, pairs)
+        if _sensible(slot, coords) and (only is None or only(slot, coords))
     ]
-    # A velocity of the contact with its momentum or without looks nearly the same: where the first is nowhere
-    # near the best, the second need not be tried.
-    first = [(slot, own) for slot, own in groups if slot.momentum != "consistent"]
-    curves = sorted(_score(found, first), key=lambda c: -c.evidence)
-    near = {c.kin for c in curves[:_FEW]}
+    # A velocity of the contact scores nearly the same with and without its momentum: only if the first is
+    # close to the best is the second tried.
+    first = [(slot, coords) for slot, coords in groups if slot.momentum != "consistent"]
+    curves = sorted(_score(moved, first), key=lambda c: -c.evidence)
+    best_keys = {c.kin for c in curves[:_FEW]}
     second = [
-        (slot, own)
-        for slot, own in groups
-        if slot.momentum == "consistent" and (not first or _kin(slot, own) in near)
+        (slot, coords)
+        for slot, coords in groups
+        if slot.momentum == "consistent" and (not first or _key(slot, coords) in best_keys)
     ]
-    curves = sorted(curves + _score(found, second), key=lambda c: -c.evidence)
+    curves = sorted(curves + _score(moved, second), key=lambda c: -c.evidence)
     return CurveScan(curves, len(groups))
 
 
-def _kin(slot: Slot, own: tuple[Coordinate, ...]) -> tuple[str, ...]:
-    return (slot.name, *(c.name for c in own))
+def _key(slot: Slot, coords: tuple[Coordinate, ...]) -> tuple[str, ...]:
+    return (slot.name, *(c.name for c in coords))
 
 
-def _score(found: Responses, groups: Sequence[tuple[Slot, tuple[Coordinate, ...]]]) -> list[Curve]:
-    """Every slot's curve over the same coordinates at once: what the splines are there is the same."""
+def _score(moved: Responses, groups: Sequence[tuple[Slot, tuple[Coordinate, ...]]]) -> list[Curve]:
+    """Score the curves of every slot over the same coordinates at once, because they share the splines."""
     over: dict[tuple[str, ...], tuple[tuple[Coordinate, ...], list[Slot]]] = {}
-    for slot, own in groups:
-        over.setdefault(tuple(c.name for c in own), (own, []))[1].append(slot)
+    for slot, coords in groups:
+        over.setdefault(tuple(c.name for c in coords), (coords, []))[1].append(slot)
 
-    def one(item: tuple[tuple[Coordinate, ...], list[Slot]]) -> list[Curve]:
-        own, slots = item
-        splines = _splines(found, own)
-        scores = score_splines(found, slots, own, splines)
-        return [_curve(found, slot, own, splines, score) for slot, score in zip(slots, scores, strict=True)]
+    def score_group(item: tuple[tuple[Coordinate, ...], list[Slot]]) -> list[Curve]:
+        coords, slots = item
+        splines = _splines(moved, coords)
+        scores = score_splines(moved, slots, coords, splines)
+        return [
+            _curve(moved, slot, coords, splines, score) for slot, score in zip(slots, scores, strict=True)
+        ]
 
-    return [curve for part in parallel_map(one, over.values()) for curve in part]
+    return [curve for part in parallel_map(score_group, over.values()) for curve in part]
 
 
 def score_splines(
-    found: Responses,
+    moved: Responses,
     slots: Sequence[Slot],
-    own: tuple[Coordinate, ...],
+    coords: tuple[Coordinate, ...],
     splines: tuple[Spline, ...],
-    known: bool = False,
+    parameters_fixed: bool = False,
 ) -> list[Score]:
-    """Score the splines' coefficients of a curve in each of several slots, each curve as if it were alone."""
-    designs = _designs(found, own, splines)
-    return score_forcings(found.fit, [found.columns(slot, *designs) for slot in slots], known)
+    """Score the spline coefficients of a curve in each slot, each curve as if it were alone."""
+    designs = _designs(moved, coords, splines)
+    return score_forcings(moved.fit, [moved.columns(slot, *designs) for slot in slots], parameters_fixed)
 
 
 def refined(curve: Curve, fit: Fit) -> Curve:
-    """The curve around a fit on finer knots, so that the smoothness prior alone says how much it bends.
+    """Refit the curve on finer knots, so that only the smoothness prior limits its curvature.
 
-    It reaches as far as the fit's data. A surface keeps its knots.
+    It covers the range of the fit's data. A surface keeps its knots.
     """
-    found = responses(fit)
-    finer = _splines(found, curve.coordinates)
+    moved = responses(fit)
+    finer = _splines(moved, curve.coordinates)
     if len(finer) == 1:
         finer = (replace(finer[0], intervals=_FINER * finer[0].intervals),)
-    (score,) = score_splines(found, [curve.slot], curve.coordinates, finer)
-    return _curve(found, curve.slot, curve.coordinates, finer, score)
+    (score,) = score_splines(moved, [curve.slot], curve.coordinates, finer)
+    return _curve(moved, curve.slot, curve.coordinates, finer, score)
 
 
 def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
-    """The curve from the score around another fit, whose model holds the curve with coefficients `at`."""
-    found = responses(fit)
-    (score,) = score_splines(found, [curve.slot], curve.coordinates, curve.splines)
+    """Score the curve around another fit whose model has the curve with coefficients `at`."""
+    flow = responses(fit)
+    (score,) = score_splines(flow, [curve.slot], curve.coordinates, curve.splines)
     smoothed = smooth(score, curve.roughness, fit.observations, at)
     moved = replace(score, gradient=score.gradient + score.information @ at)
     return replace(
@@ -266,7 +278,7 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
 
 
 def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:
-    """The coordinates, and pairs of those that are not made of each other."""
+    """Yield the coordinates, and pairs of independent ones."""
     single = coordinates(model)
     yield from ((c,) for c in single)
     if not pairs:
@@ -275,49 +287,49 @@ def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:
     for a, b in itertools.combinations((c for c in single if c.name != "t"), 2):
         parts = [made_of.get(c.name, {c.name}) for c in (a, b)]
         if not parts[0] & parts[1]:
-            # What goes round comes last: a surface can begin anew along its second coordinate.
+            # A periodic coordinate comes last: a surface can be periodic along its second coordinate.
             yield (b, a) if a.angle else (a, b)
 
 
-def _sensible(slot: Slot, own: tuple[Coordinate, ...]) -> bool:
-    """Whether the curve is not another one written differently: friction over Omega is a torque over it."""
-    return not (slot.name == "friction" and any(c.name == "Omega" for c in own))
+def _sensible(slot: Slot, coords: tuple[Coordinate, ...]) -> bool:
+    """Return False for a curve equivalent to another: friction over Omega is a torque over it."""
+    return not (slot.name == "friction" and any(c.name == "Omega" for c in coords))
 
 
-def _splines(found: Responses, own: tuple[Coordinate, ...]) -> tuple[Spline, ...]:
-    straight, round_ = (INTERVALS, ROUND) if len(own) == 1 else (INTERVALS_OF_TWO, ROUND_OF_TWO)
+def _splines(moved: Responses, coords: tuple[Coordinate, ...]) -> tuple[Spline, ...]:
+    straight, round_ = (INTERVALS, ROUND) if len(coords) == 1 else (INTERVALS_OF_TWO, ROUND_OF_TWO)
     result = []
-    for c in own:
-        spline = along(found.along(c)[found.linked], c.angle, round_)
+    for c in coords:
+        spline = along(moved.along(c)[moved.linked], c.angle, round_)
         result.append(spline if spline.periodic else replace(spline, intervals=straight))
     return tuple(result)
 
 
 def _designs(
-    found: Responses, own: tuple[Coordinate, ...], splines: tuple[Spline, ...]
+    moved: Responses, coords: tuple[Coordinate, ...], splines: tuple[Spline, ...]
 ) -> tuple[Array, Array]:
-    """The basis functions at the places of every link, and how fast they change there."""
-    x = [found.along(c) for c in own]
+    """Evaluate the basis functions at the places of every link, and their rates of change."""
+    x = [moved.along(c) for c in coords]
     values = [s.design(v) for s, v in zip(splines, x, strict=True)]
-    changes = [s.design(v, 1) * found.speed(c)[..., None] for s, v, c in zip(splines, x, own, strict=True)]
-    if len(own) == 1:
+    changes = [s.design(v, 1) * moved.speed(c)[..., None] for s, v, c in zip(splines, x, coords, strict=True)]
+    if len(coords) == 1:
         return values[0], changes[0]
     return product(*values), product(changes[0], values[1]) + product(values[0], changes[1])
 
 
 def _curve(
-    found: Responses,
+    moved: Responses,
     slot: Slot,
-    own: tuple[Coordinate, ...],
+    coords: tuple[Coordinate, ...],
     splines: tuple[Spline, ...],
     score: Score,
 ) -> Curve:
     roughness = _roughness(splines)
-    smoothed = smooth(score, roughness, found.fit.observations)
+    smoothed = smooth(score, roughness, moved.fit.observations)
     p, fall, number = chance(score, roughness)
     return Curve(
         slot,
-        own,
+        coords,
         splines,
         smoothed.coefficients,
         smoothed.covariance,
@@ -327,7 +339,7 @@ def _curve(
         p,
         fall,
         number,
-        tuple(found.along(c)[found.linked, 0] for c in own),
+        tuple(moved.along(c)[moved.linked, 0] for c in coords),
         score,
     )
 

@@ -1,4 +1,4 @@
-"""A penalised curve from its score, smoothness by marginal likelihood, with a test of known level."""
+"""Penalised curve from its score, with smoothness by marginal likelihood and a test of exact level."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from udd.discovery.scoring.forcing import Score
 
 Array = NDArray[np.float64]
 
-#: Numbers of smooth directions, beside the straight line or the constant, that the test looks at.
+#: Numbers of smooth directions, in addition to the straight line or the constant, that are tested.
 ORDERS = (0, 2, 4, 7, 12, 20, 36)
-_SMALL = 1e-7  # of the information's size: the roughness that decides where the data say nothing
-_NOTHING = 1e-10  # a direction of less than this size is none
-_SEEN = 0.5  # share of a direction that must be the data's, for the test
-_STRETCH = 18.0  # the logarithms of the prior's precision that are tried, each way
+# share of the information's size at which the roughness decides, where the data have no information
+_SMALL = 1e-7
+_NOTHING = 1e-10  # relative size below which a direction is dropped
+_SEEN = 0.5  # information of a direction in units of its prior, above which it is tested
+_STRETCH = 18.0  # range of the log precision of the prior that is tried, each way
 
 
 @dataclass(frozen=True)
 class DemmlerReinschBasis:
-    """Combinations of the coefficients that data and prior both treat as independent, the smooth ones first.
+    """Combinations of the coefficients that are independent in data and prior, the smooth ones first.
 
     Attributes
     ----------
     vectors : ndarray (k, r)
-        Their coefficients.
+        Coefficients of the combinations.
     gradient : ndarray (r,)
     information, roughness : ndarray (r,)
-        The diagonals that remain of the two matrices.
+        Diagonals of the two matrices in this basis.
     straight : int
-        How many have no roughness: the constant, and the straight line where there is no period.
+        Count of directions without roughness: the constant, and the straight line unless periodic.
     """
 
     vectors: Array
@@ -45,18 +46,18 @@ class DemmlerReinschBasis:
 
 @dataclass(frozen=True)
 class PenalizedFit:
-    """A curve's coefficients under the smoothness prior that the evidence asks for.
+    """Coefficients of a curve under the smoothness prior with the highest evidence.
 
     Attributes
     ----------
     coefficients : ndarray (k,)
     covariance : ndarray (k, k)
     precision : float
-        Of the prior on second differences.
+        Precision of the prior on second differences.
     df : float
         Effective degrees of freedom.
     evidence : float
-        Logarithm of the evidence over that for no curve.
+        Log evidence relative to no curve.
     """
 
     coefficients: Array
@@ -68,29 +69,29 @@ class PenalizedFit:
 
 @dataclass(frozen=True)
 class Confounding:
-    """What the free parameters of a fit do as well as a curve would.
+    """Directions in which a curve is confounded with the free parameters of a fit.
 
-    A constant that moves the wheels is the drive's speed, a torque proportional to Omega is friction: how
-    much of these belongs to the curve cannot be known.
+    A constant velocity of the contact is equivalent to the drive's speed, and a torque proportional to Omega
+    to friction: these parts of a curve are not identifiable.
 
     Attributes
     ----------
     rows : ndarray (a, k)
-        How much of each of a such curves there is in coefficients.
+        Amount of each confounded curve in the coefficients.
     vectors : ndarray (k, a)
-        By how much the coefficients change, most likely, with each.
+        Most probable change of the coefficients with each of them.
     """
 
     rows: Array
     vectors: Array
 
     def aligned(self, coefficients: Array, to: Array) -> Array:
-        """The coefficients with as much of these curves as others have, to compare the two."""
+        """Return the coefficients with the confounded part of other ones, for comparison."""
         result: Array = coefficients + self.vectors @ (self.rows @ (to - coefficients))
         return result
 
     def left(self, covariance: Array) -> Array:
-        """The covariance of a curve of which these are agreed upon."""
+        """Return the covariance of a curve whose confounded part is fixed."""
         result: Array = covariance - self.vectors @ self.rows @ covariance
         return result
 
@@ -100,58 +101,62 @@ def directions(score: Score, roughness: Array) -> DemmlerReinschBasis:
     information = score.information
     size = float(np.trace(information)) or 1.0
     unit = roughness * (size / np.trace(roughness))
-    both, turn = eigh(information + _SMALL * unit)
-    keep = both > _NOTHING * both[-1]
-    whiten = turn[:, keep] / np.sqrt(both[keep])
+    eigenvalues, turn = eigh(information + _SMALL * unit)
+    keep = eigenvalues > _NOTHING * eigenvalues[-1]
+    whiten = turn[:, keep] / np.sqrt(eigenvalues[keep])
     rough, turn = eigh(whiten.T @ unit @ whiten)
     rough = np.maximum(rough, 0.0)
     vectors = whiten @ turn
     nothing = 1e-6 * float(np.median(rough))
     straight = int((rough <= nothing).sum())
     rough[:straight] = 0.0
-    own = np.maximum(np.einsum("ka,kl,la->a", vectors, information, vectors), 0.0)
+    diagonal = np.maximum(np.einsum("ka,kl,la->a", vectors, information, vectors), 0.0)
     return DemmlerReinschBasis(
-        vectors, vectors.T @ score.gradient, own, rough * (np.trace(roughness) / size), straight
+        vectors, vectors.T @ score.gradient, diagonal, rough * (np.trace(roughness) / size), straight
     )
 
 
 def smooth(score: Score, roughness: Array, observations: int, at: Array | None = None) -> PenalizedFit:
-    """The curve under the prior of the highest evidence.
+    """Fit the curve under the prior with the highest evidence.
 
-    Second differences are normal with a common variance, which the evidence chooses; a constant and a slope
-    are each charged as a parameter is by the Bayesian information criterion.
+    Second differences are normal with a common variance, which the evidence chooses. A constant and a slope
+    each have the price of a parameter in the Bayesian information criterion.
 
     Parameters
     ----------
     score : Score
     roughness : ndarray (k, k)
     observations : int
-        Numbers in the record.
+        Count of observed numbers in the record.
     at : ndarray (k,), optional
-        Coefficients of the curve that the model of the score already holds; by default none.
+        Coefficients of the curve that the scored model already has; default: none.
     """
     d = directions(score, roughness)
-    # As if from no curve at all: the quadratic form is moved there.
+    # The quadratic form is moved to the origin, as if the model had no curve.
     g = d.gradient if at is None else d.vectors.T @ (score.gradient + score.information @ at)
-    f, bent = d.information, d.roughness > 0
+    f, has_roughness = d.information, d.roughness > 0
 
-    # What is far beyond a unit's information is not held back by it.
+    # The prior of a straight part far beyond unit information is widened, so that it does not shrink it.
     straight = f / np.maximum(observations, g**2 / np.maximum(f, 1e-300))
 
     def prior(log_precision: float) -> Array:
-        return np.where(bent, np.exp(log_precision) * d.roughness, straight)
+        return np.where(has_roughness, np.exp(log_precision) * d.roughness, straight)
 
     def evidence(log_precision: float) -> float:
-        own = prior(log_precision)
+        prior_precision = prior(log_precision)
         use = f > 0
-        gain = g[use] ** 2 / (f + own)[use] - np.log1p(f[use] / own[use])
+        gain = g[use] ** 2 / (f + prior_precision)[use] - np.log1p(f[use] / prior_precision[use])
         return float(gain.sum() / 2)
 
-    # Over a few values alone no curve can bend.
-    middle = float(np.log(_typical(f[bent]) / np.median(d.roughness[bent]))) if bent.any() else 0.0
+    # Over a few distinct values no curve has any curvature.
+    middle = (
+        float(np.log(_typical(f[has_roughness]) / np.median(d.roughness[has_roughness])))
+        if has_roughness.any()
+        else 0.0
+    )
     grid = middle + np.arange(-_STRETCH, _STRETCH + 0.25, 0.5)
     likely = np.array([evidence(v) for v in grid])
-    # How smooth the curve is, is not known for sure: the evidence says how much each precision counts.
+    # The smoothness is uncertain: the precisions are averaged with their evidence as weights.
     weight = np.exp(likely - likely.max())
     weight /= weight.sum()
     total = np.maximum(f + np.array([prior(v) for v in grid]), 1e-300)
@@ -168,31 +173,31 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
 
 
 def _typical(information: Array) -> float:
-    """The median information, of those directions that the record moves where most it does not."""
+    """Return the median information, of the moved directions if the record hardly moves most of them."""
     middle = float(np.median(information + 1e-300))
     moved = information[information > _NOTHING * information.max()]
     return middle if middle > _NOTHING * information.max() or not len(moved) else float(np.median(moved))
 
 
 def chance(score: Score, roughness: Array) -> tuple[float, float, int]:
-    """Score test of a penalised curve: the p-value of the largest fall of chi2 in few smooth directions.
+    """Test a penalised curve: the p-value of the largest decrease in chi2 in few smooth directions.
 
     Without an effect the components of the gradient in the Demmler-Reinsch basis are independent and normal.
-    The fall of chi2 in the first k directions is then exactly chi2-distributed. A few values of k are tested;
-    the smallest p-value counts, times their number (Bonferroni).
+    The decrease in chi2 in the first k directions is then exactly chi2-distributed. A few values of k are
+    tested; the smallest p-value is multiplied by their number (Bonferroni).
 
     Returns
     -------
     p : float
     fall : float
-        Of chi2, by those directions.
+        Decrease in chi2 in those directions.
     number : int
-        Of directions.
+        Count of directions.
     """
     d = directions(score, roughness)
-    seen = d.information > _SEEN
-    z = np.where(seen, d.gradient**2 / np.maximum(d.information, 1e-300), 0.0)[seen]
-    straight = int(seen[: d.straight].sum())
+    is_seen = d.information > _SEEN
+    z = np.where(is_seen, d.gradient**2 / np.maximum(d.information, 1e-300), 0.0)[is_seen]
+    straight = int(is_seen[: d.straight].sum())
     falls = np.cumsum(z)
     numbers = sorted({min(straight + more, len(z)) for more in ORDERS} - {0})
     if not numbers:

@@ -1,4 +1,4 @@
-"""An effect that a model may lack."""
+"""Effect that a model may lack."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from udd.models import Model
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect with its amplitudes at zero.
+    """Effect with its amplitudes at zero.
 
     Attributes
     ----------
     effect : Effect
-        With the shape parameters that it is tried with.
+        With the shape parameters of this trial.
     title : str
-        What a reader calls it.
+        Name for a reader.
     usual : bool
-        Whether machines have such a term; a product of states that merely could be must explain more.
+        True for terms that machines have; any other product of states has a prior penalty.
     form : str
-        What kind of friction it is that every joint may have; empty for anything else.
+        Kind of friction that every joint may have; else empty.
     """
 
     effect: effects.Effect
@@ -30,25 +30,25 @@ class Candidate:
     form: str = ""
 
     def added_to(self, model: Model) -> Model:
-        """The model with this effect added, all its amplitudes zero."""
+        """Add this effect to the model, with all its amplitudes zero."""
         return model.with_effects((*model.effects, self.effect))
 
     def amplitude_indices(self, model: Model) -> list[int]:
-        """Where the amplitudes stand among the parameters of :meth:`added_to`'s model."""
+        """Return the indices of the amplitudes among the parameters of :meth:`added_to`'s model."""
         names = list(self.added_to(model).parameters)
         return [names.index(name) for name in self.amplitude_names]
 
     @property
     def parameters(self) -> int:
-        """How many numbers a fit would find: the amplitudes, a frequency, and shapes of any value."""
+        """Count of parameters that a fit estimates: amplitudes, a frequency, and free shapes."""
         return sum(p.sought for p in self.effect.spec.parameters)
 
     @property
     def scanned(self) -> int:
-        """How many numbers a scan chose for it: it can look like laws that have none."""
+        """Count of parameters chosen by a scan; such a candidate can resemble laws without them."""
         return sum(p.role == "scanned" for p in self.effect.spec.parameters)
 
     @property
     def amplitude_names(self) -> list[str]:
-        """The amplitudes' names among a model's parameters."""
+        """Names of the amplitudes among a model's parameters."""
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]

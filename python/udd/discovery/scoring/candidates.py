@@ -1,4 +1,4 @@
-"""The effects that a model may lack, as the library offers them."""
+"""Candidate effects of a model from the library."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .candidate import Candidate
 
 
 def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
-    """The effect under a name that the model has not given yet; None where it is the library's.
+    """Return the effect under an unused name; None if it is the library's and the model has it.
 
-    A model has an effect of the library but once, and its name is the library's own.
+    A model has an effect of the library only once, under the library's name.
     """
-    taken = {one.name for one in model.effects}
+    taken = {effect_of_model.name for effect_of_model in model.effects}
     if effect.name not in taken:
         return effect
     if effect.made is None:
@@ -33,11 +33,12 @@ def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
 def library(
     model: Model, given: Sequence[Candidate] = (), states: NDArray[np.float64] | None = None
 ) -> list[Candidate]:
-    """Every effect that can be added to a model, in each of its variants, but for those that are scanned.
+    """List every effect that can be added to a model, in each of its variants, except scanned ones.
 
-    Those of a user's own model are made of its states (:mod:`udd.discovery.scoring.term_library`), and dry
-    friction where a motion, (n, d), says how wide its turn may be; those given come first. Terms that the
-    free parameters absorb are not sorted out here: that shows in the data.
+    For a user's own model they are made of its states (:mod:`udd.discovery.scoring.term_library`). Dry
+    friction is included if a motion, (n, d), is given: it determines the width of its smoothed sign. `given`
+    candidates come first. Terms that the free parameters absorb are not removed here, because that depends on
+    the data.
     """
     if isinstance(model, FormulaModel):
         from .friction_terms import load_frictions
@@ -67,10 +68,10 @@ def library(
 
 
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
-    """A drive ripple at every frequency that a record can tell apart.
+    """List drive ripples at every frequency that a record can resolve.
 
-    From two turns in the record to a quarter of the frame rate (6 Hz at most), half a line apart, within the
-    effect's own range.
+    The frequencies go from two periods in the record to a quarter of the frame rate (6 Hz at most), half a
+    line apart, within the effect's own range.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an unknown curve may depend on, and where it may enter the equations."""
+"""Coordinates of unknown curves, and the places where they may enter the equations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a curve enters the equations.
+    """Place of a curve in the equations.
 
     Attributes
     ----------
@@ -27,12 +27,12 @@ class Slot:
         ``"torque"``, ``"friction"``, ``"lateral"``, ``"vertical"``, the rate of a state: ``"v'"``, or a
         force: ``"force(x)"``.
     momentum : str or None
-        For the contact's velocities: whether the momentum follows. See :class:`udd.effects.Spec`.
+        For the contact's velocities: whether the angular momentum changes too. See :class:`udd.effects.Spec`.
     equation : str
-        The state in whose equation it stands.
+        State whose equation it enters.
     forcing : callable
-        ``(model, states, value, rate) -> (..., d)``: what a curve of this value, changing at this rate, adds
-        to the rates of the states.
+        ``(model, states, value, rate) -> (..., d)``: change of the states' rates by a curve of this value
+        that changes at this rate.
     """
 
     name: str
@@ -42,37 +42,37 @@ class Slot:
 
     @property
     def title(self) -> str:
-        """What a reader calls it."""
+        """Name of the slot for a reader."""
         return self.name + (f" ({self.momentum})" if self.momentum else "")
 
 
 def coordinates(model: Model) -> tuple[Coordinate, ...]:
-    """What a model's unknown curves are tried against: its states and what is made of them, and time."""
-    own = [
+    """List the coordinates of a model's unknown curves: states, combinations of them, and time."""
+    result = [
         Coordinate(name, partial(_state, k), partial(_change, k), name in model.angles, name)
         for k, name in enumerate(model.state_names)
     ]
     if "Omega" in model.state_names:
         k = model.state_names.index("Omega")
-        own.append(Coordinate("|Omega|", partial(_size, k), partial(_growth, k), False, "abs(Omega)"))
-    own += model.profile.discovery.coordinates(model)
-    own.append(Coordinate("t", _time, _passing, False, "t"))
-    return tuple(own)
+        result.append(Coordinate("|Omega|", partial(_size, k), partial(_growth, k), False, "abs(Omega)"))
+    result += model.profile.discovery.coordinates(model)
+    result.append(Coordinate("t", _time, _passing, False, "t"))
+    return tuple(result)
 
 
 def coordinate(model: Model, name: str) -> Coordinate:
-    """The coordinate of that name.
+    """Return the coordinate with that name.
 
     Raises
     ------
     FitError
-        The model has none.
+        The model does not have it.
     """
-    for one in coordinates(model):
-        if one.name == name:
-            return one
-    known = ", ".join(c.name for c in coordinates(model))
-    raise FitError(f"a curve can be a function of {known}, not of {name!r}")
+    for candidate in coordinates(model):
+        if candidate.name == name:
+            return candidate
+    names = ", ".join(c.name for c in coordinates(model))
+    raise FitError(f"a curve can be a function of {names}, not of {name!r}")
 
 
 def _state(k: int, _t: Array, x: Array) -> Array:
@@ -101,28 +101,28 @@ def _passing(x: Array, _v: Array) -> Array:
 
 
 def slots(model: Model) -> tuple[Slot, ...]:
-    """Where a model's unknown curves are tried.
+    """List the places of a model's unknown curves.
 
-    The disk's are those of the effects (the contact's velocities with and without the momentum that goes with
-    them), a pendulum's torque and friction; any other model's are the equations themselves, but
-    for those that only say that one state is the rate of another.
+    For the disk they are those of the effects (the contact's velocities with and without the momentum that
+    goes with them); for a pendulum torque and friction. For any other model they are the equations, except
+    those in which one state is the rate of another.
     """
     named = model.profile.discovery.slots
     if named is not None:
-        return tuple(Slot(*own, _forcing(*own)) for own in named)
-    known = model.kinematic
+        return tuple(Slot(*entry, _forcing(*entry)) for entry in named)
+    kinematic = model.kinematic
     along = {v: x for x, v in model.speeds.items()} if isinstance(model, FormulaModel) and model.mass else {}
     return tuple(
         Slot(f"force({along[name]})", None, name, partial(_force, name))
         if name in along
         else Slot(f"{name}'", None, name, partial(_direct, k))
         for k, name in enumerate(model.state_names)
-        if name not in known
+        if name not in kinematic
     )
 
 
 def _forcing(name: str, momentum: str | None, equation: str) -> Callable[[Model, Array, Array, Array], Array]:
-    """What a curve in an effect's slot adds to the rates."""
+    """Return the function for the change of the rates by a curve in an effect's slot."""
     if name in ("torque", "friction"):
         return _torque if name == "torque" else _friction
     return partial(_moving, equation, momentum)
@@ -130,7 +130,7 @@ def _forcing(name: str, momentum: str | None, equation: str) -> Callable[[Model,
 
 def _inertia(model: Model, x: Array) -> Array | float:
     inertia = model.profile.dynamics.inertia
-    assert inertia is not None  # of a model whose effects enter by slots
+    assert inertia is not None  # models whose effects enter by slots have it
     return inertia(model, x)
 
 

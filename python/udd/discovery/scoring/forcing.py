@@ -1,4 +1,4 @@
-"""The score of forcings of any form, from the flow's response to them."""
+"""Score of arbitrary forcings, from the flow's response to them."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .coordinates import coordinate as named
 
 Array = NDArray[np.float64]
 
-_COLUMNS = 240  # scored at a time: what a long record takes in memory
+_COLUMNS = 240  # scored at a time, to limit the memory for a long record
 
 
 @dataclass(frozen=True, repr=False)
 class Score(OneLine):
-    """What the score says of the amplitudes of one group of columns.
+    """Score of the amplitudes of one group of columns.
 
-    Everything else optimal, chi2 falls by ``2 gradient . c - c . information c`` when they take the values c;
-    both in units of the fit's own scatter.
-    Taken `alone` is the information on each amplitude were all free parameters known.
+    With everything else optimal, chi2 decreases by ``2 gradient . c - c . information c`` if the amplitudes
+    are c; both in units of the fit's own scatter. `alone` is the information on each amplitude with all free
+    parameters fixed.
     """
 
     gradient: Array
@@ -37,19 +37,20 @@ class Score(OneLine):
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """How the fitted motion answers to forcings, at a few places of every link between frames.
+    """Response of the fitted motion to forcings, at a few places of every link between frames.
 
     Attributes
     ----------
     t : ndarray (n, q)
     states, rates : ndarray (n, q, d)
-        The states there and how fast they change, by the fitted model.
+        States there, and their rates of change by the fitted model.
     response : ndarray (n, q, d, d)
-        ``[i, q, :, m]`` is what a unit forcing of the m-th equation there adds to the state at frame i + 1.
+        ``[i, q, :, m]`` is the change of the state at frame i + 1 by a unit forcing of the m-th equation
+        there.
     linked : ndarray of bool (n,)
-        Where frames are not linked there is no motion between them.
+        Between frames that are not linked there is no motion.
     films : tuple of ndarray of bool (n,)
-        Which links each film holds.
+        Links of each film.
     """
 
     fit: Fit
@@ -61,66 +62,66 @@ class Responses:
     films: tuple[NDArray[np.bool_], ...]
 
     def along(self, coordinate: Coordinate) -> Array:
-        """A coordinate's values, (n, q)."""
+        """Return a coordinate's values, (n, q)."""
         result = np.zeros(self.t.shape)
-        for own, film in self._of_films(coordinate):
-            result[film] = own.of(self.t[film], self.states[film])
+        for film_coordinate, film in self._of_films(coordinate):
+            result[film] = film_coordinate.of(self.t[film], self.states[film])
         return result
 
     def speed(self, coordinate: Coordinate) -> Array:
-        """How fast a coordinate changes, (n, q)."""
+        """Return a coordinate's rate of change, (n, q)."""
         result = np.zeros(self.t.shape)
-        for own, film in self._of_films(coordinate):
-            result[film] = own.rate(self.states[film], self.rates[film])
+        for film_coordinate, film in self._of_films(coordinate):
+            result[film] = film_coordinate.rate(self.states[film], self.rates[film])
         return result
 
     def _of_films(self, coordinate: Coordinate) -> list[tuple[Coordinate, NDArray[np.bool_]]]:
-        """The coordinate as each film's own drive makes it, and which links the film holds."""
+        """Return the coordinate for each film's own drive, with the film's links."""
         films = zip(self.fit.models, self.films, strict=True)
         return [(named(model, coordinate.name), film) for model, film in films]
 
     def columns(self, slot: Slot, value: Array, rate: Array) -> Array:
-        """What forcings (n, q, k), changing at these rates, add to the state at a link's end, (n, d, k)."""
-        one, none = np.ones(self.t.shape), np.zeros(self.t.shape)
+        """Compute the change of the state at a link's end by forcings (n, q, k) and rates, (n, d, k)."""
+        unit, none = np.ones(self.t.shape), np.zeros(self.t.shape)
         result: Array = np.zeros((len(self.t), self.states.shape[-1], value.shape[-1]))
-        for strengths, part in (((one, none), value), ((none, one), rate)):
-            own = np.zeros(self.states.shape)
+        for strengths, part in (((unit, none), value), ((none, unit), rate)):
+            forcing = np.zeros(self.states.shape)
             for model, film in zip(self.fit.models, self.films, strict=True):
-                own[film] = slot.forcing(model, self.states[film], *(s[film] for s in strengths))
-            if own.any():
-                # One product of matrices per frame: (d, q) with (q, k).
-                acting = np.einsum("iqdm,iqm->iqd", self.response, own)
+                forcing[film] = slot.forcing(model, self.states[film], *(s[film] for s in strengths))
+            if forcing.any():
+                # one product of matrices per frame: (d, q) with (q, k)
+                acting = np.einsum("iqdm,iqm->iqd", self.response, forcing)
                 result += np.swapaxes(acting, 1, 2) @ part
         return result
 
 
 def responses(fit: Fit) -> Responses:
-    """How a fitted motion answers to forcings."""
+    """Compute the response of a fitted motion to forcings."""
     linked = fit.record.linked
     t, states, response = _core.responses(replace(fit.problem.at(fit.point), free=()))
-    # Between frames that are not linked nothing moves; any state will do there.
+    # Between frames that are not linked there is no motion; any state will do there.
     t = np.where(linked[:, None], t, fit.record.t[:-1, None])
     states = np.where(linked[:, None, None], states, fit.states[:-1, None])
     films = tuple(fit.record.film[:-1] == k for k in range(len(fit.models)))
     rates = np.zeros(states.shape)
-    for own, film in zip(fit.models, films, strict=True):
-        rates[film] = own.rates(t[film], states[film])
+    for model, film in zip(fit.models, films, strict=True):
+        rates[film] = model.rates(t[film], states[film])
     return Responses(fit, t, states, rates, response, linked, films)
 
 
-def score_forcings(fit: Fit, columns: Sequence[Array], known: bool = False) -> list[Score]:
+def score_forcings(fit: Fit, columns: Sequence[Array], parameters_fixed: bool = False) -> list[Score]:
     """Score groups of columns, each as if it were alone.
 
     Parameters
     ----------
     fit : Fit
     columns : sequence of ndarray (n - 1, d, k)
-        What each amplitude adds to the state at every link's end.
-    known : bool
-        Whether the free parameters are taken as known instead of refitted.
+        Change of the state at every link's end with each amplitude.
+    parameters_fixed : bool
+        True to fix the free parameters instead of refitting them.
     """
     problem = fit.problem.at(fit.point)
-    if known:
+    if parameters_fixed:
         problem = replace(problem, free=())
     scatter = max(fit.scatter, 1.0)
     scores: list[Score] = []
@@ -128,19 +129,19 @@ def score_forcings(fit: Fit, columns: Sequence[Array], known: bool = False) -> l
         sizes = [c.shape[-1] for c in some]
         at_end = np.ascontiguousarray(np.concatenate(some, axis=-1))
         gradient, information, alone = _core.score_columns(problem, at_end, sizes)
-        own, square = 0, 0
+        first, square = 0, 0
         for k in sizes:
             block = information[square : square + k * k].reshape(k, k) / scatter
-            part = slice(own, own + k)
+            part = slice(first, first + k)
             scores.append(Score(gradient[part] / scatter, (block + block.T) / 2, alone[part] / scatter))
-            own, square = own + k, square + k * k
+            first, square = first + k, square + k * k
     return scores
 
 
 def _batches(columns: Sequence[Array]) -> list[list[Array]]:
     batches: list[list[Array]] = []
-    for one in columns:
-        if not batches or sum(c.shape[-1] for c in batches[-1]) + one.shape[-1] > _COLUMNS:
+    for column in columns:
+        if not batches or sum(c.shape[-1] for c in batches[-1]) + column.shape[-1] > _COLUMNS:
             batches.append([])
-        batches[-1].append(one)
+        batches[-1].append(column)
     return batches

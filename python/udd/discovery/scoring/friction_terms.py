@@ -1,4 +1,4 @@
-"""Friction that depends on more than the speed's sign or square, in a user's own mechanical model."""
+"""Friction beyond the speed's sign or square, in a user's own mechanical model."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .term_library import unused_names, word_for
 
 Array = NDArray[np.float64]
 
-#: Powers of the speed by which friction grows, that a scan tries: 1 is quadratic drag, 2 a cubic one.
+#: Powers of the speed in the friction coefficient that a scan tries: 1 is quadratic drag, 2 a cubic one.
 POWERS = (0.4, 0.7, 1.4, 1.7, 2.5)
-#: Times in which friction settles, in units of the record's length.
+#: Settling times of friction, in units of the record's length.
 DURATIONS = (0.02, 0.05, 0.12, 0.3, 0.7)
-_WIDTHS = (0.06, 0.15, 0.4)  # of the range that the motion visits
-_SPEEDS = 9  # parts of the range of speeds, in the middle of which drag may begin
-_ROUND = 1e-3  # of a speed's root mean square, within which corners are rounded off
-_TURNS = 0.03  # of the same, over which the sign of dry friction under load turns over
+_WIDTHS = (0.06, 0.15, 0.4)  # share of the visited range
+_SPEEDS = 9  # parts of the range of speeds; drag may begin in the middle of each
+_ROUND = 1e-3  # share of a speed's root mean square within which corners are rounded off
+_TURNS = 0.03  # the same for the sign of dry friction under load
 _BRAKE, _EITHER = (-np.inf, 0.0), (-np.inf, np.inf)
 
 
 def places(visited: Array, width: float, *, angle: bool = False) -> list[float]:
-    """Places a width from each other, within what a motion visits; one turn of an angle that goes round."""
+    """Return places a width apart within the visited range; at most one turn of an angle."""
     low, high = float(np.min(visited)), float(np.max(visited))
     if angle and high - low > 2 * np.pi:
         low, high = 0.0, 2 * np.pi
@@ -37,23 +37,23 @@ def places(visited: Array, width: float, *, angle: bool = False) -> list[float]:
 
 
 def speeds(visited: Array) -> list[float]:
-    """Speeds between rest and the fastest."""
+    """Return speeds between zero and the fastest."""
     fastest = float(np.abs(visited).max())
     return [fastest * (k + 0.5) / _SPEEDS for k in range(_SPEEDS)]
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A coordinate of a mechanical model that friction may act on.
+    """Coordinate of a mechanical model on which friction may act.
 
     Attributes
     ----------
     x, v : str
-        The states that are the coordinate and its rate.
+        States: the coordinate and its rate.
     slot : str
-        Where a force on it enters.
+        Place of a force on it in the equations.
     places, speeds : ndarray (n,)
-        What a motion makes of them.
+        Their values along a motion.
     angle : bool
     """
 
@@ -66,12 +66,12 @@ class Joint:
 
     @property
     def typical(self) -> float:
-        """The speed's root mean square."""
+        """Root mean square of the speed."""
         return float(np.sqrt(np.nanmean(self.speeds**2)))
 
 
 def _joints(model: FormulaModel, states: Array) -> list[Joint]:
-    """The coordinates whose speed has an equation of its own, if the motion moves them."""
+    """Return the coordinates with a dynamic equation for the speed, if the motion changes them."""
     result = []
     for x, v in model.speeds.items():
         where, fast = (states[:, model.state_names.index(name)] for name in (x, v))
@@ -81,13 +81,13 @@ def _joints(model: FormulaModel, states: Array) -> list[Joint]:
 
 
 def load_frictions(model: FormulaModel, states: Array) -> list[Candidate]:
-    """Dry friction of every joint that grows with the load of a pendulum: its weight, and what turns it.
+    """List dry friction in every joint that grows with a pendulum's load (weight and centrifugal force).
 
     Parameters
     ----------
     model : FormulaModel
     states : ndarray (n, d)
-        A motion, which says how wide the turn of the sign may be.
+        A motion, which determines the width of the smoothed sign.
     """
     result = []
     for joint in _joints(model, states):
@@ -99,20 +99,20 @@ def load_frictions(model: FormulaModel, states: Array) -> list[Candidate]:
 
 
 def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[Candidate]]:
-    """Of every joint: drag with a power, or above a speed, friction that settles with time, or near a place.
+    """List frictions of every joint: a power of the speed, above a speed, settling, or near a place.
 
     Parameters
     ----------
     model : FormulaModel
     states : ndarray (n, d)
-        A motion, which says where and how fast it goes.
+        A motion, which determines the ranges of places and speeds.
     duration : float
-        How long it takes.
+        Duration of the motion.
 
     Returns
     -------
     list of list of Candidate
-        For each law the values of its shapes that are tried.
+        For each law its candidates, one for each value of the shapes.
     """
     result = []
     for joint in _joints(model, states):
@@ -125,14 +125,14 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
         title = "friction that settles with time"
         result.append(_listed(model, joint, title, settling, {"c": _EITHER}, times))
         away = f"2*sin(({x} - {{b}})/2)" if joint.angle else f"{x} - {{b}}"
-        near, span = f"{{c}}*exp(-(({away})/{{s}})^2)*{v}", float(np.ptp(joint.places))
+        local, span = f"{{c}}*exp(-(({away})/{{s}})^2)*{v}", float(np.ptp(joint.places))
         span = min(span, 2 * np.pi) if joint.angle else span
         tried = [
             {"b": place, "s": share * span}
             for share in _WIDTHS
             for place in places(joint.places, share * span, angle=joint.angle)
         ]
-        result.append(_listed(model, joint, f"friction near a place of {x}", near, {"c": _BRAKE}, tried))
+        result.append(_listed(model, joint, f"friction near a place of {x}", local, {"c": _BRAKE}, tried))
         above = f"(abs({v}) - {{b}})"
         beyond = f"{{c}}*({above} + sqrt({above}^2 + {small}))/2*{v}"
         tried = [{"b": speed} for speed in speeds(joint.speeds)]
@@ -148,7 +148,7 @@ def _listed(
     limits: dict[str, tuple[float, float]],
     tried: Sequence[dict[str, float]],
 ) -> list[Candidate]:
-    """A law in a joint with each value of its shapes; braces in its text are parameters."""
+    """List a law in a joint with each value of its shapes; braces in its text are parameters."""
     if not tried:
         return []
     title, shapes = f"{kind} in {joint.slot}", list(tried[0])
@@ -159,14 +159,16 @@ def _listed(
     ranges |= {called[name]: (0.0, np.inf) for name in shapes if name != "b"}
     spec = written(joint.slot, text.format(**called), word_for(title), title, linear, ranges, tuple(names))
     first = called[shapes[0]] if shapes else ""
-    # A width that goes with a place is a shape: the place's prior is as wide.
+    # The width at a place is a shape, and the prior of the place has the same width.
     listed = (
         p if p.role == "amplitude" else replace(p, role="scanned" if p.name == first else "shape", grid=_FREE)
         for p in spec.parameters
     )
     spec = replace(spec, parameters=tuple(listed))
     zero = (0.0,) * len(linear)
-    return [Candidate(effects.Effect(spec.name, (*zero, *one.values()), made=spec), title) for one in tried]
+    return [
+        Candidate(effects.Effect(spec.name, (*zero, *values.values()), made=spec), title) for values in tried
+    ]
 
 
-_FREE = (0.5, 1.5)  # the grid of a shape that may have any value
+_FREE = (0.5, 1.5)  # grid of a shape that may have any value

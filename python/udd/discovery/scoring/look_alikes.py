@@ -1,4 +1,4 @@
-"""Candidates that do nearly the same along a motion as one that explains it."""
+"""Candidates that act almost like a known explanation along a motion."""
 
 from __future__ import annotations
 
@@ -14,51 +14,49 @@ from udd.models import Model
 
 from .candidate import Candidate
 
-_LIKE = 0.95  # correlation along the motion from which on
-_STEP = 1e-5  # of a parameter, by which differences are taken
-_SEEN = 1e-6  # of a candidate's work that the free parameters must leave
+_LIKE = 0.95  # correlation along the motion above which a candidate is a look-alike
+_STEP = 1e-5  # relative step of a parameter in difference quotients
+_SEEN = 1e-6  # share of a candidate's effect that the free parameters must leave
 
 
-def look_alikes(known: Model, fitted: Fit, candidates: Iterable[Candidate]) -> list[tuple[Candidate, float]]:
-    """Regression of what was found on each candidate, along the motion that was found with it.
+def look_alikes(base: Model, fitted: Fit, candidates: Iterable[Candidate]) -> list[tuple[Candidate, float]]:
+    """Regress the effect that was added on each candidate, along the motion that was fitted with it.
 
-    Around a model that goes astray the right form may score lower than others, or not at all; beside one that
-    does nearly the same it is seen. What the model's free parameters can do as well is left out of both: with
-    the gain free a dead zone is like a saturation.
+    Around a diverged model the right form may score lower than others, or not at all; next to one that acts
+    almost the same it is visible. The part that the model's free parameters absorb is removed from both: with
+    a free gain a dead zone resembles a saturation.
 
     Parameters
     ----------
     known : Model
-        Without the last effect of the fit.
+        The model without the last effect of the fit.
     fitted : Fit
     candidates : iterable of Candidate
-        Those with several amplitudes are passed over.
+        Candidates with several amplitudes are skipped.
 
     Returns
     -------
     list of (Candidate, float)
-        Those that are like it, with the amplitude at which they are, the likest first.
+        The look-alikes with their amplitudes, the most similar first.
     """
     first = fitted.record.film == 0
     t, states = fitted.record.t[first], fitted.states[first]
-    known = known.with_parameters({name: fitted.model.parameters[name] for name in known.parameters})
-    without = known.rates(t, states)
-    absorbed = by_parameter(
-        known, [name for name in known.parameters if name in fitted.parameters], t, states
-    )
+    base = base.with_parameters({name: fitted.model.parameters[name] for name in base.parameters})
+    without = base.rates(t, states)
+    absorbed = by_parameter(base, [name for name in base.parameters if name in fitted.parameters], t, states)
 
     def added(effect: Effect) -> NDArray[np.float64]:
         try:
-            return known.with_effects((*known.effects, effect)).rates(t, states) - without
-        except ModelError:  # it has no value there
+            return base.with_effects((*base.effects, effect)).rates(t, states) - without
+        except ModelError:  # undefined there
             return np.full_like(without, np.nan)
 
-    def left(rates: NDArray[np.float64]) -> NDArray[np.float64]:
-        own = rates.ravel()
-        return own - absorbed @ np.linalg.lstsq(absorbed, own)[0]
+    def unabsorbed(rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        projected = rates.ravel()
+        return projected - absorbed @ np.linalg.lstsq(absorbed, projected)[0]
 
-    wanted, found = left(added(fitted.model.effects[-1])), []
-    if not wanted.any():
+    target, matches = unabsorbed(added(fitted.model.effects[-1])), []
+    if not target.any():
         return []
     for candidate in candidates:
         if len(candidate.effect.amplitudes) != 1:
@@ -67,16 +65,16 @@ def look_alikes(known: Model, fitted: Fit, candidates: Iterable[Candidate]) -> l
         whole = added(candidate.effect.replace(**{name: 1.0}))
         if not np.isfinite(whole).all():
             continue
-        own = left(whole)
-        size = float((own**2).sum())
+        projected = unabsorbed(whole)
+        size = float((projected**2).sum())
         if not size > _SEEN * float((whole**2).sum()):
             continue
-        amplitude = float((own * wanted).sum()) / size
-        likeness = abs(amplitude) * np.sqrt(size / float((wanted**2).sum()))
+        amplitude = float((projected * target).sum()) / size
+        likeness = abs(amplitude) * np.sqrt(size / float((target**2).sum()))
         if likeness > _LIKE:
-            found.append((likeness, candidate, amplitude))
-    found.sort(key=lambda one: -one[0])
-    return [(candidate, amplitude) for _likeness, candidate, amplitude in found]
+            matches.append((likeness, candidate, amplitude))
+    matches.sort(key=lambda match: -match[0])
+    return [(candidate, amplitude) for _likeness, candidate, amplitude in matches]
 
 
 def by_parameter(

@@ -1,4 +1,4 @@
-"""Frequencies at which a system swings by itself, and the mains': no drive is told from either."""
+"""Natural frequencies of a system, and the mains': a drive at either cannot be identified."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from udd.models import Model
 Array = NDArray[np.float64]
 
 _HARMONICS = 5
-_MAINS = (50.0, 60.0)  # Hz, which a sensor hears
-_WANDERS = 0.004  # share of it by which the mains' frequency may be off
-_SLOWEST = 0.5  # Hz, below which hum that is sampled too slowly is no wave but a drift
-_LINES = 1.0  # of the record, 1/s over its length, within which two frequencies are one
-_NEAR = 0.2  # share of a mode's frequency within which the motion's own line is that mode
-_STEP = 1e-5  # of each state's size, for the rates' slopes
+_MAINS = (50.0, 60.0)  # Hz; sensors pick up hum
+_WANDERS = 0.004  # relative error of the mains' frequency
+_SLOWEST = 0.5  # Hz, below which undersampled hum is not a wave but a drift
+_LINES = 1.0  # spectral lines (1/duration) within which two frequencies are equal
+_NEAR = 0.2  # share of a mode's frequency within which the motion's line is that mode
+_STEP = 1e-5  # relative step of each state in difference quotients
 
 
 def modes(model: Model, t: Array, states: Array) -> Array:
-    """Frequencies of a model's modes, linearised around the mean of a motion, and of their lines in it.
+    """Compute frequencies of a model's modes, linearised around a motion's mean, and of their spectral lines.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ def modes(model: Model, t: Array, states: Array) -> Array:
     Returns
     -------
     ndarray (k,)
-        Cycles per unit of time. Of a mode that the motion shows as a line beside its linear frequency, as a
-        swing of large amplitude does, both are among them.
+        Cycles per unit of time. A mode whose line in the motion is away from its linear frequency, as for a
+        swing of large amplitude, has both.
 
     Examples
     --------
@@ -58,24 +58,24 @@ def modes(model: Model, t: Array, states: Array) -> Array:
     frequencies = np.fft.rfftfreq(4 * len(t), (t[-1] - t[0]) / (len(t) - 1))
     window = np.hanning(len(t))[:, None]
     power = (np.abs(np.fft.rfft((states - middle) * window / size, 4 * len(t), axis=0)) ** 2).sum(axis=1)
-    found = list(linear)
+    result = list(linear)
     for f in linear:
-        near = np.flatnonzero(np.abs(frequencies - f) < _NEAR * f)
-        if len(near):
-            peak = frequencies[near[np.argmax(power[near])]]
+        in_range = np.flatnonzero(np.abs(frequencies - f) < _NEAR * f)
+        if len(in_range):
+            peak = frequencies[in_range[np.argmax(power[in_range])]]
             if abs(peak - f) > _LINES / np.ptp(t):
-                found.append(float(peak))
-    return np.unique(found)
+                result.append(float(peak))
+    return np.unique(result)
 
 
 def belongs(frequencies: Array, fit: Fit) -> NDArray[np.bool_]:
-    """Which frequencies are the system's own or the mains'.
+    """Return True for each frequency of the system's own or of the mains'.
 
-    Its modes', up to the fifth harmonic, and the sums and differences of two modes. The mains' hum also where
-    the record, sampled too slowly for it, shows it.
+    These are its modes', up to the fifth harmonic, and the sums and differences of two modes. The mains' hum
+    also counts at its alias in the record.
     """
-    own = fit.record.film == 0
-    t, states = fit.record.t[own], fit.states[own]
+    first_film = fit.record.film == 0
+    t, states = fit.record.t[first_film], fit.states[first_film]
     single = modes(fit.model, t, states)
     listed = [n * f for f in single for n in range(1, _HARMONICS + 1)]
     listed += [abs(a + sign * b) for a, b in itertools.combinations(single, 2) for sign in (1, -1)]
@@ -90,13 +90,13 @@ def belongs(frequencies: Array, fit: Fit) -> NDArray[np.bool_]:
 
 
 def alias(frequency: float, t: Array) -> float:
-    """Where a frequency appears in a record that is sampled evenly, and too slowly for it.
+    """Return the alias of a frequency in an evenly sampled record.
 
     Parameters
     ----------
     frequency : float
     t : ndarray (n,)
-        Times, s; in a record that was averaged in blocks, the blocks'.
+        Times, s; for block averages, those of the blocks.
 
     Examples
     --------

@@ -23,33 +23,33 @@ from .forcing import responses, score_forcings
 from .natural_modes import belongs
 from .term_library import waves
 
-#: A candidate is absorbed when the free parameters take this share of its information.
+#: Share of a candidate's information below which it counts as absorbed by the free parameters.
 _ABSORBED = 1e-4
-_ALIKE = 1e6  # condition of the information from which on candidates act alike
-_STRONG = 4.0  # times the usual amplitudes, of effects that may have either sign
-_WAVES = 100  # scored at a time: what a long record takes in memory
-_AT_ONCE = 20_000  # looked at together: some ten megabytes
-_MOST_PAIRS = 700_000  # looked at in all: a few seconds
-_LINES = 24  # of a scan over frequencies, looked at between them too
+_ALIKE = 1e6  # condition number of the information above which candidates are not distinguishable
+_STRONG = 4.0  # factor on the usual amplitudes, for effects that may have either sign
+_WAVES = 100  # scored at a time, to limit the memory for a long record
+_AT_ONCE = 20_000  # evaluated together: some ten megabytes
+_MOST_PAIRS = 700_000  # evaluated in all: a few seconds
+_LINES = 24  # strongest lines of a frequency scan, whose neighbourhoods are scanned too
 
 
 @dataclass(frozen=True)
 class Scored:
-    """What the score says of one candidate.
+    """Score of one candidate.
 
     Attributes
     ----------
     candidate : Candidate
     chi2 : float
-        By how much chi2 would fall, in units of the fit's own scatter.
+        Decrease in chi2, in units of the fit's own scatter.
     p : float
-        Probability of so large a fall by chance, for one candidate looked at.
+        Probability of so large a decrease by chance, for this candidate alone.
     amplitudes, errors : tuple of float
         Estimates with standard errors, in SI units.
     absorbed : bool
-        The free parameters already do what this candidate does: the data cannot see it.
+        True if the free parameters already have the same effect on the data.
     physical : bool
-        The amplitudes lie in their physical range (friction takes energy out).
+        True if the amplitudes are in their physical range (friction dissipates energy).
     """
 
     candidate: Candidate
@@ -63,7 +63,7 @@ class Scored:
 
 @dataclass(frozen=True)
 class Scan:
-    """Scores of a list of candidates with what is needed for their combinations."""
+    """Scores of a list of candidates, with the matrices for their combinations."""
 
     scored: list[Scored]
     gradient: NDArray[np.float64]
@@ -72,15 +72,15 @@ class Scan:
     scatter: float
 
     def pairs(self, most: int | None = None) -> tuple[list[tuple[list[Scored], float]], int]:
-        """Two candidates with the fall of chi2 that both together give, largest first.
+        """Rank pairs of candidates by their joint decrease in chi2; at most so many, with the count of all.
 
-        At most so many pairs, and how many there are. Where there are millions only those of the candidates
-        that alone give most are looked at; the others count, too, as the data chose which. What a scan chose
-        the value of is in none: beside another law it looks like a third.
+        If there are millions, only pairs of the strongest candidates are evaluated; the others count, too,
+        because the data made the choice. Scanned candidates are in no pair: combined with another law they
+        imitate a third.
         """
-        told_apart = [k for k, s in enumerate(self.scored) if not (s.absorbed or s.candidate.scanned)]
-        usable = self._strongest(told_apart)
-        # Candidates that act alike have no place side by side.
+        distinguishable = [k for k, s in enumerate(self.scored) if not (s.absorbed or s.candidate.scanned)]
+        usable = self._strongest(distinguishable)
+        # Indistinguishable candidates are not combined.
         unit = _unit(self.information)
 
         def alike(at: NDArray[np.intp]) -> NDArray[np.float64]:
@@ -88,18 +88,18 @@ class Scan:
 
         def fall(at: NDArray[np.intp]) -> NDArray[np.float64]:
             g = self.gradient[at][:, :, None]
-            found = g.mT @ np.linalg.solve(self.information[at[:, :, None], at[:, None, :]], g)
-            return np.asarray(found[:, 0, 0]) / self.scatter
+            gains = g.mT @ np.linalg.solve(self.information[at[:, :, None], at[:, None, :]], g)
+            return np.asarray(gains[:, 0, 0]) / self.scatter
 
         pairs = np.array(list(itertools.combinations(usable, 2)), dtype=np.intp).reshape(-1, 2)
         pairs = pairs[self._each(pairs, alike) < _ALIKE]
         falls = self._each(pairs, fall)
         order = np.argsort(-falls, kind="stable")
-        found = [([self.scored[k] for k in pairs[i]], float(falls[i])) for i in order[:most]]
-        return found, len(order) + math.comb(len(told_apart), 2) - math.comb(len(usable), 2)
+        gains = [([self.scored[k] for k in pairs[i]], float(falls[i])) for i in order[:most]]
+        return gains, len(order) + math.comb(len(distinguishable), 2) - math.comb(len(usable), 2)
 
     def _strongest(self, usable: list[int]) -> list[int]:
-        """Candidates that make no more pairs than are looked at."""
+        """Return the strongest candidates, few enough to evaluate all their pairs."""
         many = len(usable)
         while math.comb(many, 2) > _MOST_PAIRS:
             many -= 1
@@ -109,24 +109,24 @@ class Scan:
     def _each(
         self, pairs: NDArray[np.intp], value: Callable[[NDArray[np.intp]], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        """A value of each pair from its columns: of those with as many columns many at a time."""
-        widths = np.array([len(own) for own in self.columns], dtype=np.intp)
+        """Evaluate each pair from its columns, many pairs of the same widths at a time."""
+        widths = np.array([len(columns) for columns in self.columns], dtype=np.intp)
         table = np.zeros((len(widths), widths.max(initial=1)), dtype=np.intp)
-        for row, own in zip(table, self.columns, strict=True):
-            row[: len(own)] = own
+        for row, columns in zip(table, self.columns, strict=True):
+            row[: len(columns)] = columns
         result = np.empty(len(pairs))
-        # The widths of a pair as one number, which is told apart sooner than a row.
+        # The widths of a pair as one number, which is faster to compare than a row.
         kinds = widths[pairs] @ (widths.max(initial=0) + 1) ** np.arange(pairs.shape[1])
-        for one in np.unique(kinds):
-            rows = np.flatnonzero(kinds == one)
-            kind = widths[pairs[rows[0]]]
+        for kind_number in np.unique(kinds):
+            rows = np.flatnonzero(kinds == kind_number)
+            pair_widths = widths[pairs[rows[0]]]
             for some in np.array_split(rows, len(rows) // _AT_ONCE + 1):
-                at = [table[pairs[some, k], :width] for k, width in enumerate(kind)]
+                at = [table[pairs[some, k], :width] for k, width in enumerate(pair_widths)]
                 result[some] = value(np.concatenate(at, axis=1))
         return result
 
     def likeness(self, i: int, j: int) -> float:
-        """How alike two candidates act on the data: the largest canonical correlation, 0 to 1."""
+        """Return the likeness of two candidates on the data: the largest canonical correlation, 0 to 1."""
         a, b = self.columns[i], self.columns[j]
         block = self.information
         left = np.linalg.solve(block[np.ix_(a, a)], block[np.ix_(a, b)])
@@ -144,11 +144,11 @@ def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
     scatter = max(fit.scatter, 1.0)
     scored, columns, first = [], [], 0
     for candidate in candidates:
-        own = list(range(first, first + len(candidate.amplitude_names)))
-        first += len(own)
-        columns.append(own)
-        block = information[np.ix_(own, own)]
-        scored.append(score_of(candidate, gradient[own], block, alone[own], scatter))
+        indices = list(range(first, first + len(candidate.amplitude_names)))
+        first += len(indices)
+        columns.append(indices)
+        block = information[np.ix_(indices, indices)]
+        scored.append(score_of(candidate, gradient[indices], block, alone[indices], scatter))
     return Scan(scored, gradient, information, columns, scatter)
 
 
@@ -156,19 +156,19 @@ def strongest_ripple(fit: Fit) -> tuple[Scored | None, int]:
     """Periodogram of score tests: the strongest drive ripple, and the number of frequencies tested.
 
     The frequencies are half a line (1 / duration) apart. First every second one is scored. A ripple between
-    two lines still has two fifths of its strength in both, so that the frequencies between are only scored
-    beside the strongest lines. For a user's own model it is the strongest harmonic force in any equation; a
+    two lines still has two fifths of its strength in both, so the frequencies between are only scored next to
+    the strongest lines. For a user's own model the result is the strongest harmonic force in any equation; a
     pendulum has none.
     """
     if isinstance(fit.model, FormulaModel):
-        found = _scan_waves(fit, fit.model)
-        return max(found, key=lambda s: s.chi2, default=None), len(found)
+        scored = _scan_waves(fit, fit.model)
+        return max(scored, key=lambda s: s.chi2, default=None), len(scored)
     candidates = ripples(fit.model, fit.record.t)
     lines = scan_ripples(fit, candidates[::2])
     best = sorted(range(len(lines)), key=lambda k: -lines[k].chi2)[:_LINES]
     between = sorted({2 * k + side for k in best for side in (-1, 1)} & set(range(len(candidates))))
-    beside = scan_ripples(fit, [candidates[k] for k in between])
-    return max(lines + beside, key=lambda s: s.chi2, default=None), len(candidates)
+    neighbours = scan_ripples(fit, [candidates[k] for k in between])
+    return max(lines + neighbours, key=lambda s: s.chi2, default=None), len(candidates)
 
 
 def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
@@ -183,7 +183,7 @@ def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
 
 def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
     moved, t = responses(fit), fit.record.t
-    # As of the drive's ripple on the disk: what is much faster than the motion does nothing to it.
+    # As for the disk's drive ripple: forces much faster than the motion have no effect.
     fastest = min(0.25 / float(np.median(np.diff(t)[fit.record.linked])), 6.0 / motion_time_scale(fit))
     frequencies = np.arange(2.0 / np.ptp(t), fastest, 0.5 / np.ptp(t))
     frequencies = frequencies[~belongs(frequencies, fit)]
@@ -194,16 +194,16 @@ def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
     result: list[Scored] = []
     for first in range(0, len(candidates), _WAVES):
         some, columns = candidates[first : first + _WAVES], []
-        for one in some:
-            phase = 2 * np.pi * one.effect.values[-1] * moved.t
-            slot = by_name[one.effect.slots[0]]
+        for candidate in some:
+            phase = 2 * np.pi * candidate.effect.values[-1] * moved.t
+            slot = by_name[candidate.effect.slots[0]]
             value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
             columns.append(moved.columns(slot, value, np.zeros(value.shape)))
-        for one, score in zip(some, score_forcings(fit, columns), strict=True):
+        for candidate, score in zip(some, score_forcings(fit, columns), strict=True):
             gradient, information, alone = (
                 scatter * part for part in (score.gradient, score.information, score.alone)
             )
-            result.append(score_of(one, gradient, information, alone, scatter))
+            result.append(score_of(candidate, gradient, information, alone, scatter))
     return result
 
 
@@ -214,13 +214,13 @@ def score_of(
     alone: NDArray[np.float64],
     scatter: float,
 ) -> Scored:
-    """What a score's gradient and information, in units of chi2, say of a candidate."""
+    """Make a candidate's score from gradient and information in units of chi2."""
     n = len(gradient)
     nothing = Scored(candidate, 0.0, 1.0, (0.0,) * n, (np.inf,) * n, True, True)
-    own = np.diag(information)
+    diagonal = np.diag(information)
     if not (np.isfinite(information).all() and np.isfinite(gradient).all()):
-        return nothing  # what runs away from where the motion is says nothing there
-    if np.any(own <= _ABSORBED * alone) or np.linalg.eigvalsh(_unit(information)).min() < _ABSORBED:
+        return nothing  # an effect that diverges away from the motion has no score there
+    if np.any(diagonal <= _ABSORBED * alone) or np.linalg.eigvalsh(_unit(information)).min() < _ABSORBED:
         return nothing
     covariance = np.linalg.inv(information)
     estimate = covariance @ gradient
@@ -238,10 +238,10 @@ def score_of(
 
 
 def physical(candidate: Candidate, estimate: Iterable[float], errors: Iterable[float]) -> bool:
-    """Whether amplitudes lie in their range, give or take their error.
+    """Return True if amplitudes are in their range, within two standard errors.
 
-    Where both signs are, the range says what is usual, which a strong effect, and more so its score around a
-    fit that went astray, may leave.
+    If the range includes both signs it is only typical: a strong effect may exceed it, and even more its
+    score around a diverged fit.
     """
     ranges = [p.range for p in candidate.effect.spec.parameters if p.role == "amplitude"]
     wide = [(_STRONG * low, _STRONG * high) if low < 0 < high else (low, high) for low, high in ranges]

@@ -1,4 +1,4 @@
-"""Effects with a place, a power or a time of their own: the best value, by scores from one response."""
+"""Effects with a place, a power or a time: the best value, by scores from one response."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from .score_scan import Scored, score_of
 
 Array = NDArray[np.float64]
 
-_AT_ONCE = 100  # scored at a time: what a long record takes in memory
+_AT_ONCE = 100  # scored at a time, to limit the memory for a long record
 
 
 def strongest_shapes(fit: Fit) -> tuple[list[Scored], int]:
-    """Score each effect that has a number to be scanned at each of its values.
+    """Score each effect with a scanned number at each of its values.
 
     Returns
     -------
     strongest : list of Scored
-        One for each effect, two with a place: a pendulum passes a place on either side alike.
+        One for each effect; two if the number is a place, because a pendulum passes either side alike.
     number : int
-        How many were scored.
+        Count of scores.
     """
     moved = responses(fit)
     strongest, number = [], 0
@@ -46,26 +46,26 @@ def strongest_shapes(fit: Fit) -> tuple[list[Scored], int]:
 
 
 def _best(some: Sequence[Scored]) -> list[Scored]:
-    """The strongest, and of an effect with a place and a width the strongest that is elsewhere."""
+    """Return the strongest, and for an effect with a place and a width also the strongest elsewhere."""
     if not some:
         return []
     first = max(some, key=lambda s: s.chi2)
     where, *widths = _shape_values(first)
     if not widths:
         return [first]
-    # Without this a brake is placed at -0.15 rad that stands at 0.15 rad.
+    # Without this a brake at 0.15 rad is placed at -0.15 rad.
     others = [s for s in some if abs(_shape_values(s)[0] - where) > 2 * max(widths[0], _shape_values(s)[1])]
     return [first, max(others, key=lambda s: s.chi2)] if others else [first]
 
 
 def _shape_values(scored: Scored) -> list[float]:
-    """An effect's scanned number, then its widths."""
+    """Return an effect's scanned number, then its widths."""
     effect = scored.candidate.effect
     return [effect.parameters[p.name] for p in effect.spec.parameters if p.role in ("scanned", "shape")]
 
 
 def _candidates(fit: Fit) -> Iterator[list[Candidate]]:
-    """What is tried of each effect."""
+    """Yield the candidates of each effect."""
     model, duration = fit.model, float(np.ptp(fit.record.t))
     there = {effect.name for effect in model.effects}
     if isinstance(model, FormulaModel):
@@ -87,7 +87,7 @@ def _candidates(fit: Fit) -> Iterator[list[Candidate]]:
 
 
 def _values(along: str, model: Model, states: Array, duration: float, width: float = 0.0) -> Sequence[float]:
-    """What is tried of a number of the library's, by what it is."""
+    """Return the values to try for a scanned number of the library, by its kind."""
     if along == "power":
         return POWERS
     if along == "duration":
@@ -98,22 +98,24 @@ def _values(along: str, model: Model, states: Array, duration: float, width: flo
 
 
 def _scored(fit: Fit, moved: Responses, listed: Sequence[Candidate]) -> list[Scored]:
-    """Score candidates of one effect, which differ in its shapes alone."""
+    """Score candidates of one effect, which differ only in its shapes."""
     scatter, result = max(fit.scatter, 1.0), []
     for first in range(0, len(listed), _AT_ONCE):
-        columns = [(one, _column(moved, one.effect)) for one in listed[first : first + _AT_ONCE]]
-        usable = [(one, column) for one, column in columns if column is not None]
+        columns = [
+            (candidate, _column(moved, candidate.effect)) for candidate in listed[first : first + _AT_ONCE]
+        ]
+        usable = [(candidate, column) for candidate, column in columns if column is not None]
         scores = score_forcings(fit, [column for _one, column in usable])
-        for (one, _column_of), score in zip(usable, scores, strict=True):
+        for (candidate, _column_of), score in zip(usable, scores, strict=True):
             gradient, information, alone = (
                 scatter * part for part in (score.gradient, score.information, score.alone)
             )
-            result.append(score_of(one, gradient, information, alone, scatter))
+            result.append(score_of(candidate, gradient, information, alone, scatter))
     return result
 
 
 def _column(moved: Responses, effect: Effect) -> Array | None:
-    """What a unit amplitude adds to the state at every link's end, (n, d, 1); None if it has no value."""
+    """Return the change of the state at every link's end by a unit amplitude, (n, d, 1), or None."""
     (name,) = effect.amplitudes
     added = np.zeros(moved.states.shape)
     for model, film in zip(moved.fit.models, moved.films, strict=True):

@@ -1,4 +1,4 @@
-"""The terms that a user's own model may lack, made of its states."""
+"""Terms that a user's own model may lack, made of its states."""
 
 from __future__ import annotations
 
@@ -22,30 +22,32 @@ from .candidate import Candidate
 from .coordinates import slots
 
 _DEGREE = 3
-#: Products of so many states and inputs may have that degree: of 4 there are 35 for each equation, of 12
-#: there would be 455.
+#: Maximum of states and inputs for products of the third degree: 4 have 35 for each equation, 12 would have
+#: 455.
 _FEW = 4
-_MOST = 200  # terms of an equation; beyond it sines and cosines are not multiplied by states
-#: Widths over which dry friction turns, in units of the speed's root mean square. As narrow as the last it
-#: holds a body at rest for thousands of swings; of a driven machine that rests now and then, read to 1e-3 of
-#: its motion, ten times as wide leaves an error that is taken for a second friction.
+_MOST = 200  # maximum of terms in an equation; above it sines and cosines are not multiplied by states
+#: Widths of the smoothed sign of dry friction, in units of the speed's root mean square. The narrowest keeps
+#: a body at rest for thousands of swings. For a driven machine that rests now and then, read to 1e-3 of its
+#: motion, a width ten times larger leaves an error that looks like a second friction.
 _WIDTHS = (0.3, 0.03, 0.002, 0.0002)
-#: The same of what has a threshold, in units of its own root mean square.
+#: The same for terms with a threshold, in units of the argument's root mean square.
 _BOUNDS = (0.7, 0.2)
-_SWINGS = 0.3  # of its root mean square that its standard deviation is, for that
+_SWINGS = 0.3  # minimum ratio of the argument's standard deviation to its root mean square, for that
 
 
 def terms(model: FormulaModel) -> list[Candidate]:
-    """Every term that is tried in the equations of a user's own model, but for dry friction.
+    """List every term that is tried in the equations of a user's own model, except dry friction.
 
-    Of the states that are no angles and of the measured inputs: a constant, all products up to the third
-    degree (of more than four of them up to the second, and the cube of each), and each times its own size;
-    of each angle and of every two angles' difference sine and cosine, also times each of the others unless
-    an equation then had more than 200 terms; of every angle the rate, where that is no state itself. An
-    equation that only says that one state is the rate of another gets none. Of a mechanical model, where a
-    state is another one's rate, forces as machines have them (inputs, springs, drags, gravity) are
-    preferred by a prior penalty on the others. Where it has a mass matrix, all are forces along its
-    coordinates, and those of machines act between two of them too.
+    - Of states that are not angles and of measured inputs: a constant, all products up to the third degree,
+      and each times its absolute value. With more than four of them products go up to the second degree, and
+      the cube of each is added.
+    - Of each angle and of the difference of every two angles: sine and cosine, also times each of the others
+      unless an equation then had more than 200 terms. If the rate of an angle is no state, it is added.
+
+    Equations in which one state is the rate of another get no terms. In a mechanical model forces that
+    machines have (inputs, springs, drags, gravity) are preferred by a prior penalty on the others. With a
+    mass matrix all terms are forces along its coordinates; those that machines have also act between two
+    coordinates.
     """
     plain = [(text, word_for(text), text) for text in _of_states(model)]
     rates = {name: model.equations[name] for name in model.angles}
@@ -55,15 +57,15 @@ def terms(model: FormulaModel) -> list[Candidate]:
         state, along = slot.equation, along_of(slot.name)
         usual = _own_forces(model, along) if along else _forces(model, state)
         moving = [(f"({text})", f"rate_of_{k}", f"{k}'") for k, text in rates.items() if k != state]
-        for one in plain + moving:
-            machine = not usual or one[2] in usual or one in moving
-            if not (along and one[2] in usual):  # there already
-                result.append(replace(_candidate(model, slot.name, *one), usual=machine))
+        for entry in plain + moving:
+            machine = not usual or entry[2] in usual or entry in moving
+            if not (along and entry[2] in usual):  # listed already
+                result.append(replace(_candidate(model, slot.name, *entry), usual=machine))
     return result
 
 
 def delays(model: FormulaModel) -> list[Candidate]:
-    """The delay of every measured input that has none: felt later, or seen later where it is negative."""
+    """List the delay of every measured input without one; a negative delay is one of the observation."""
     late = model.late
     (tau,) = unused_names(model, "tau")
     result = []
@@ -76,14 +78,14 @@ def delays(model: FormulaModel) -> list[Candidate]:
 
 
 def _ways(model: FormulaModel) -> list[str]:
-    """What the forces of a model with a mass matrix act along: its coordinates, and between two of a kind."""
+    """List the lines of force of a model with a mass matrix: its coordinates, and pairs of the same kind."""
     pairs = itertools.combinations(model.speeds, 2)
     between = [f"{b} - {a}" for a, b in pairs if (a in model.angles) == (b in model.angles)]
     return [*model.speeds, *between] if model.mass else []
 
 
 def _along(model: FormulaModel, along: str) -> tuple[str, str]:
-    """The rate of what a force acts along, and what a reader calls that."""
+    """Return the rate along a line of force, and its name for a reader."""
     first, *other = along.split(" - ")
     if not other:
         return model.speeds[first], f"along {first}"
@@ -91,14 +93,14 @@ def _along(model: FormulaModel, along: str) -> tuple[str, str]:
 
 
 def _own_forces(model: FormulaModel, x: str) -> set[str]:
-    """What :func:`_machines` has along a coordinate, as :func:`_of_states` writes it."""
+    """Return the terms of :func:`_machines` along a coordinate, as :func:`_of_states` writes them."""
     v = model.speeds[x]
-    own = {f"sin({x})", f"cos({x})"} if x in model.angles else {x, f"{x}^3"}
-    return {"1", v, f"abs({v})*{v}", f"{v}^3", *own}
+    position_terms = {f"sin({x})", f"cos({x})"} if x in model.angles else {x, f"{x}^3"}
+    return {"1", v, f"abs({v})*{v}", f"{v}^3", *position_terms}
 
 
 def _machines(model: FormulaModel, along: str) -> list[Candidate]:
-    """Forces as machines have them, but for dry friction, along a coordinate or between two."""
+    """List forces that machines have, except dry friction, along a coordinate or between two."""
     v, where = _along(model, along)
     (c,) = unused_names(model, "c")
     brake, either = (0.0, np.inf), (-np.inf, np.inf)
@@ -124,7 +126,7 @@ def _machines(model: FormulaModel, along: str) -> list[Candidate]:
 
 
 def _forces(model: FormulaModel, state: str) -> set[str]:
-    """The terms of an equation that are forces as machines have them; none where it is of no speed."""
+    """Return the terms of an equation that are forces of machines; none unless it is a speed's."""
     rates = _speeds(model)
     if state not in rates.values():
         return set()
@@ -143,43 +145,43 @@ def _forces(model: FormulaModel, state: str) -> set[str]:
 
 
 def _speeds(model: FormulaModel) -> dict[str, str]:
-    """The states whose rate is a state, with that one."""
+    """Map states whose rate is a state to that state."""
     return {name: model.equations[name].strip() for name in model.kinematic}
 
 
 def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
-    """Dry friction of every speed and of every two bodies' relative speed, in every equation of a speed.
+    """List dry friction of every speed and of every relative speed of two bodies, in every speed's equation.
 
-    Where an angle's rate is no state, of that rate in every equation that there is. Of a model with a mass
-    matrix, along each coordinate and between two. The sign is smoothed over a width, of which a few are
+    If an angle's rate is no state, friction of that rate is tried in every equation. With a mass matrix
+    friction acts along each coordinate and between two. The sign is smoothed over a width, of which a few are
     tried.
 
     Parameters
     ----------
     model : FormulaModel
     states : ndarray (n, d)
-        A motion, which says how wide.
+        A motion, which determines the widths.
     """
     if model.mass:
         return _dry_forces(model, states)
-    own = _speeds(model)
-    moving = {name: text for name, text in model.equations.items() if name in own or name in model.angles}
+    rates = _speeds(model)
+    moving = {name: text for name, text in model.equations.items() if name in rates or name in model.angles}
     size = model.rates(0.0, states) if moving else states
     columns = {name: size[:, model.state_names.index(name)] for name in moving}
     speeds = [
-        (text, _said(own, name), values)
+        (text, _said(rates, name), values)
         for (name, text), values in zip(moving.items(), columns.values(), strict=True)
     ]
-    for a, b in itertools.combinations(own, 2):
+    for a, b in itertools.combinations(rates, 2):
         if (a in model.angles) == (b in model.angles):
-            text = f"{own[a]} - {own[b]}"
+            text = f"{rates[a]} - {rates[b]}"
             speeds.append((text, text, columns[a] - columns[b]))
     result = []
     for state in model.state_names:
         if state in model.kinematic:
             continue
         for text, said, values in speeds:
-            # What is another body's may drive this one.
+            # The friction of another body may drive this one.
             low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
             name, title = f"dry_{word_for(said)}_in_{state}", f"dry friction of {said} in {state}'"
             inner = text if text.isidentifier() else f"({text})"
@@ -188,8 +190,8 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
 
 
 #: Forces with a threshold {b}, and the limits of their amplitudes: of a displacement, and of an input. An
-#: input's dead zone takes from its gain within the threshold, its limit beyond it: were one written as the
-#: other, it would have to hold the whole gain, and the known model's none.
+#: input's dead zone reduces its gain within the threshold, its limit beyond it. Written as the other one,
+#: each would need the whole gain as its amplitude, and zero gain in the known model.
 _BEYOND = "(max({x} - {b}, 0) + min({x} + {b}, 0))"
 _SMOOTH = ("saturation", "tanh({x}/{b})", (-np.inf, np.inf))
 _IN_PLACE = (("dead zone", _BEYOND, (-np.inf, np.inf)), _SMOOTH)
@@ -201,11 +203,11 @@ _IN_INPUT = (
 
 
 def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
-    """Forces with a threshold in a displacement or an input: dead zones, limits and saturations.
+    """List forces with a threshold in a displacement or an input: dead zones, limits and saturations.
 
-    Beside the force in proportion that a model has, a dead zone of a displacement is that of a spring or a
-    gear with play; with the other sign it is a stop. A motor that does not answer to little has one of
-    its input, one that gives no more a limit. ``tanh`` is a saturation without corners.
+    In addition to a model's proportional force, a dead zone of a displacement describes a spring or a gear
+    with play; with the other sign it is a stop. A motor that ignores small inputs has a dead zone of its
+    input; one with bounded output has a limit. ``tanh`` is a smooth saturation.
     """
     rates = _speeds(model)
     along = {v: x for x, v in model.speeds.items()} if model.mass else {}
@@ -220,7 +222,7 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
         slot = f"force({along[state]})" if state in along else f"{state}'"
         for x, values in sizes.items():
             if float(np.nanstd(values)) < _SWINGS * _typical(values):
-                continue  # what stays on one side of zero does not show a zone about it
+                continue  # an argument on one side of zero does not show a zone around zero
             for kind, term, limits in _IN_INPUT if x in model.inputs else _IN_PLACE:
                 title = f"{kind} of {x} in {slot}"
                 name = f"{word_for(kind)}_of_{x}_in_{_place(slot)}"
@@ -241,13 +243,13 @@ def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candid
     return result
 
 
-def _said(own: dict[str, str], name: str) -> str:
-    """What a reader calls a state's rate."""
-    return own.get(name, f"{name}'")
+def _said(rates: dict[str, str], name: str) -> str:
+    """Return the name of a state's rate for a reader."""
+    return rates.get(name, f"{name}'")
 
 
 def _typical(values: NDArray[np.float64]) -> float:
-    """The root mean square."""
+    """Compute the root mean square."""
     return float(np.sqrt(np.nanmean(values**2)))
 
 
@@ -262,7 +264,7 @@ def _turning(
     widths: tuple[float, ...] = _WIDTHS,
     role: str = "width",
 ) -> list[Candidate]:
-    """A term that turns over within a width ``{b}``: each of these, in units of its argument's size."""
+    """List a term that turns over within a width ``{b}``, for each width in units of its argument's size."""
     typical = _typical(argument)
     if not typical > 0.0:
         return []
@@ -276,18 +278,20 @@ def _turning(
 
 
 def given_terms(model: FormulaModel, given: Iterable[tuple[str, Expression]]) -> list[Candidate]:
-    """The terms that a user asks for, each an equation's state and a formula.
+    """Make the terms that a user asks for, each an equation's state and a formula.
 
     Raises
     ------
     ModelError
-        One that the model cannot have.
+        A term is not possible in the model.
     """
     result = []
-    for one in given:
-        if isinstance(one, str) or not isinstance(one, (tuple, list)) or len(one) != 2:
-            raise ModelError(f"a candidate is a state and a term, as in ('v', 'abs(v)*v'), not {one!r}")
-        state, term = str(one[0]).removesuffix("'"), text_of("a candidate", one[1])
+    for entry in given:
+        if isinstance(entry, str) or not isinstance(entry, (tuple, list)) or len(entry) != 2:
+            raise ModelError(
+                f"a candidate must be a state and a term, as in ('v', 'abs(v)*v'), not {entry!r:.80}"
+            )
+        state, term = str(entry[0]).removesuffix("'"), text_of("a candidate", entry[1])
         slot = state if along_of(state) else f"{state}'"
         if slot != state and state not in model.state_names:
             raise ModelError(
@@ -310,7 +314,7 @@ def _candidate(model: FormulaModel, slot: str, text: str, name: str, said: str) 
 
 
 def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
-    """A drive of each frequency in each equation that says more than what another state's rate is."""
+    """List a wave of each frequency in each equation that is not just the rate of another state."""
     a, b, f = unused_names(model, "a", "b", "f")
     text = f"{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
     result = []
@@ -326,12 +330,12 @@ def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
 
 
 def _place(slot: str) -> str:
-    """A slot as a part of a name."""
+    """Return a slot as a part of a name."""
     return word_for(slot.removesuffix("'"))
 
 
 def unused_names(model: FormulaModel, *wanted: str) -> list[str]:
-    """Names for a term's parameters that mean nothing in the model."""
+    """Return names for a term's parameters that are unused in the model."""
     taken = {*model.state_names, *dict(model.values), *model.inputs, "t", "pi"}
     return [
         next(n for n in (name, *(f"{name}{k}" for k in range(1, 99))) if n not in taken) for name in wanted
@@ -359,7 +363,7 @@ def _product(names: tuple[str, ...]) -> str:
 
 
 def word_for(text: str) -> str:
-    """A word that says what a term is."""
+    """Make an identifier that describes a term."""
     if text == "1":
         return "constant"
     said = text.replace("^", "").replace(" - ", "_less_").replace("-", "_less_").replace("/", "_over_")

@@ -42,19 +42,19 @@ X: Node = ("x",)
 
 
 def read(text: str, names: dict[str, Node]) -> tuple[Node, list[float]]:
-    """A formula from its text, by the core's grammar; its numbers become constants to fit, with these values.
+    """Parse a formula by the core's grammar; its numbers become constants to fit, with these start values.
 
-    Whole exponents stay as they are; what the core computes from numbers alone is one number. A square root
-    is a power, whose exponent can be fitted.
+    Whole exponents stay literal, and arithmetic on numbers alone is done at once. A square root becomes a
+    power with an exponent that can be fitted.
 
     Raises
     ------
     ValueError
-        Something in it is not of the grammar, or no operation of such a formula.
+        The text has a name or an operation that such formulas do not have.
     """
     values: list[float] = []
     stack: list[Node] = []
-    known = list(names.values())
+    nodes = list(names.values())
 
     def constant(value: float) -> Node:
         values.append(value)
@@ -65,15 +65,15 @@ def read(text: str, names: dict[str, Node]) -> tuple[Node, list[float]]:
         del stack[len(stack) - takes :]
         match name, taken:
             case "state", []:
-                made = known[int(number)]
+                made = nodes[int(number)]
             case "number", []:
                 made = constant(number)
-            case "-", [one]:
-                made = ("*", ("n", -1.0), one)
-            case "^", [one]:
-                made = ("^", one, ("n", number))
-            case "sqrt", [one]:
-                made = ("^", one, constant(0.5))
+            case "-", [operand]:
+                made = ("*", ("n", -1.0), operand)
+            case "^", [operand]:
+                made = ("^", operand, ("n", number))
+            case "sqrt", [operand]:
+                made = ("^", operand, constant(0.5))
             case _ if name in (_UNARY if takes == 1 else _BINARY):
                 made = (name, *taken)
             case _:
@@ -83,18 +83,18 @@ def read(text: str, names: dict[str, Node]) -> tuple[Node, list[float]]:
 
 
 def evaluate(node: Node, x: Array, values: Sequence[float | Array]) -> Array:
-    """The formula's values; not finite where it is not defined.
+    """Evaluate the formula; not finite where it is undefined.
 
-    Constants may be columns (rows, 1): each row of the result is then made with its own.
+    Constants may be columns (rows, 1): each row of the result then has its own values.
     """
     with np.errstate(all="ignore"):
-        found = _value(node, x, values)
-    result: Array = np.array(np.broadcast_to(found, np.broadcast_shapes(np.shape(found), x.shape)))
+        value = _value(node, x, values)
+    result: Array = np.array(np.broadcast_to(value, np.broadcast_shapes(np.shape(value), x.shape)))
     return result
 
 
 def _value(node: Node, x: Array, values: Sequence[float | Array]) -> Any:
-    """What a part of the formula comes to, a number where it is the same everywhere."""
+    """Evaluate a part of the formula; a number if it is constant."""
     kind = node[0]
     if kind == "x":
         return x
@@ -105,12 +105,12 @@ def _value(node: Node, x: Array, values: Sequence[float | Array]) -> Any:
 
 
 def constants(node: Node) -> list[int]:
-    """The numbers of its constants, in order of appearance."""
+    """Return the numbers of its constants, in order of appearance."""
     return list(dict.fromkeys(part[1] for part in parts(node) if part[0] == "c"))
 
 
 def parts(node: Node) -> Iterator[Node]:
-    """The formula and all that it is made of."""
+    """Yield the formula and all of its parts."""
     yield node
     if node[0] not in ("x", "n", "c"):
         for part in node[1:]:
@@ -118,12 +118,12 @@ def parts(node: Node) -> Iterator[Node]:
 
 
 def exponents(node: Node) -> set[int]:
-    """The numbers of the constants that are exponents."""
+    """Return the numbers of the constants that are exponents."""
     return {part[2][1] for part in parts(node) if part[0] == "^" and part[2][0] == "c"}
 
 
 def amplitudes(node: Node) -> set[int]:
-    """The numbers of constants to which the formula is proportional, taken together; none where it is not."""
+    """Return the numbers of constants to which the formula is jointly proportional; none if it is not."""
     if node[0] == "c":
         return {node[1]}
     if node[0] in "+-":
@@ -135,7 +135,7 @@ def amplitudes(node: Node) -> set[int]:
 
 
 def scaled(node: Node, scale: float, values: list[float]) -> Node:
-    """The formula of ``x / scale``, every scale a constant; new ones are appended to `values`."""
+    """Rewrite the formula for ``x / scale``, every scale a constant; new ones are appended to `values`."""
     if node[0] == "x":
         values.append(1.0 / scale)
         return ("*", ("c", len(values) - 1), X)
@@ -145,9 +145,9 @@ def scaled(node: Node, scale: float, values: list[float]) -> Node:
 
 
 def sensible(node: Node, angle: bool = False) -> bool:
-    """Whether a reader would take it for a law.
+    """Return True if a reader would accept the formula as a law.
 
-    No function within another, no variable in an exponent, and none that has a unit alone in a function.
+    It has no nested functions, no variable in an exponent, and no dimensional variable alone in a function.
     """
     curved = ("sin", "cos", "tanh", "exp", "ln")
     for part in parts(node):
@@ -161,7 +161,7 @@ def sensible(node: Node, angle: bool = False) -> bool:
 
 
 def without_sign(node: Node) -> Node:
-    """The formula for a variable that is never negative."""
+    """Rewrite the formula for a variable that is never negative."""
     if node == ("abs", X):
         return X
     if node[0] in ("x", "n", "c"):
@@ -170,7 +170,7 @@ def without_sign(node: Node) -> Node:
 
 
 def softened(node: Node, width: float) -> Node:
-    """The formula with broken powers rounded off within a width of zero, where their slope has no end."""
+    """Round off broken powers within a width of zero, where their slope is infinite."""
     if node[0] in ("x", "n", "c"):
         return node
     if node[0] == "^" and not (node[2][0] == "n" and float(node[2][1]).is_integer()):
@@ -180,7 +180,7 @@ def softened(node: Node, width: float) -> Node:
 
 
 def put(node: Node, number: int, value: float) -> Node:
-    """The formula with a literal instead of a constant."""
+    """Replace a constant by a literal."""
     if node[0] == "c":
         return ("n", value) if node[1] == number else node
     if node[0] in ("x", "n"):
@@ -189,7 +189,7 @@ def put(node: Node, number: int, value: float) -> Node:
 
 
 def simplify(node: Node, values: list[float]) -> Node:
-    """Without what changes nothing; constants that only appear together become one.
+    """Simplify the formula; constants that only appear together are merged.
 
     New constants are appended to `values`.
     """
@@ -212,7 +212,7 @@ def _is(node: Node, value: float) -> bool:
 
 
 def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
-    """An operation of simple parts, written more simply where that is possible."""
+    """Simplify an operation on simple parts."""
     if kind in "+-" and _is(b, 0.0):
         return a
     if kind == "+" and _is(a, 0.0):
@@ -229,7 +229,7 @@ def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
         return ("n", 0.0)
     number = ("n", "c")
     if kind in "+*" and b[0] in number:
-        a, b = b, a  # numbers stand first
+        a, b = b, a  # numbers come first
     if kind in "+*" and a[0] in number and b[0] == kind and b[1][0] in number:
         return _shorter(kind, simplify((kind, a, b[1]), values), b[2], values)
     if kind == "-" and b[0] in number:
@@ -240,17 +240,17 @@ def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
 
 
 def price(node: Node) -> float:
-    """How many nats it takes to write the formula down, its constants' values not counted.
+    """Compute the formula's description length in nats, without its constants' values.
 
     Each of its k operations, functions and variables is one of the n different ones in it: k ln n.
     """
     kinds = ["*" if part[0] == "/" else "+" if part[0] == "-" else part[0] for part in parts(node)]
-    own = [kind for kind in kinds if kind not in ("n", "c")]
-    return len(own) * math.log(max(len(set(own)), 2))
+    operations = [kind for kind in kinds if kind not in ("n", "c")]
+    return len(operations) * math.log(max(len(set(operations)), 2))
 
 
 def length(node: Node) -> int:
-    """How many operations, functions and variables a formula has."""
+    """Count operations, functions and variables."""
     return sum(part[0] not in ("n", "c") for part in parts(node))
 
 
@@ -265,8 +265,8 @@ def is_power(node: Node) -> bool:
 def is_single_term(node: Node) -> bool:
     """Return True if a formula is one term: a factor times one function of its coordinate, or one wave.
 
-    No operation joins two parts that both have the coordinate in them, but for the sine and the cosine of one
-    angle, and no constant stands beside the term.
+    No operation joins two parts that both depend on the coordinate, except the sine and the cosine of one
+    angle, and no constant is added to the term.
     """
     if node[0] in ("+", "-"):
         waves = {_wave(part) for part in node[1:]}
@@ -283,24 +283,24 @@ def _angles(node: Node) -> list[Node]:
 
 
 def _wave(node: Node) -> tuple[str, Node] | None:
-    """The function and the angle of a constant times a sine or a cosine."""
+    """Return the function and the angle of a constant times a sine or a cosine."""
     if node[0] == "*" and not _varies(node[1]) and node[2][0] in ("sin", "cos"):
         return node[2][0], node[2][1]
     return None
 
 
 def shape(node: Node) -> str:
-    """The formula without its constants' values, to tell equal ones by."""
+    """Write the formula without its constants' values, for comparison."""
     return write(node, "x", dict.fromkeys(constants(node), "c"))
 
 
 def write(node: Node, variable: str, names: dict[int, str]) -> str:
-    """The formula in the text grammar, its constants by these names."""
+    """Write the formula in the text grammar, its constants by these names."""
     return _text(node, variable, names)[0]
 
 
 def _text(node: Node, variable: str, names: dict[int, str]) -> tuple[str, int]:
-    """Text and how strongly it binds."""
+    """Write text and return its operator precedence."""
     kind = node[0]
     if kind == "x":
         return variable, 5

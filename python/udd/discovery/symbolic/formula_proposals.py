@@ -1,4 +1,4 @@
-"""Proposals of formulas for a curve: common forms, and symbolic regression."""
+"""Formula proposals for a curve: common forms, and symbolic regression."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .expressions import Node, X, constants, read, scaled, simplify
 
 Array = NDArray[np.float64]
 
-_PLACES = 160  # of the curve, that the regression is given
-_SURE = 1e-3  # of the largest error: no place is taken for better known
+_PLACES = 160  # places of the curve that the regression uses
+_SURE = 1e-3  # share of the largest error: lower limit of the errors
 
 
 def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
-    """Forms that are often met, each from a few starts, with a constant beside them and without."""
+    """Yield common forms, each from a few starts, with and without a constant."""
     spline, x = curve.splines[0], curve.places[0]
     size = float(np.abs(curve.values(np.quantile(x, np.linspace(0.02, 0.98, 50)))).max()) or 1.0
     low, high = (0.0, 2 * np.pi) if spline.periodic else np.quantile(x, (0.01, 0.99))
@@ -45,15 +45,15 @@ def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
             ]
         if curve.coordinates[0].angle:
             texts += [f"{size} * sin({b} * x)" for b in (1.0, 2.0, 3.0)]
-    for text, beside in itertools.product(texts, ("", f" + {size}")):
-        yield _read_fixed(text + beside)
+    for text, constant in itertools.product(texts, ("", f" + {size}")):
+        yield _read_fixed(text + constant)
     if not spline.periodic:
-        for share in (0.2, 0.4, 0.6):  # nothing below a threshold, then in proportion
+        for share in (0.2, 0.4, 0.6):  # zero below a threshold, then proportional
             yield ("*", ("c", 0), ("ramp", ("-", X, ("c", 1)))), [size / span, float(low) + share * span]
 
 
 def powers(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
-    """A power of the coordinate's size, from several exponents."""
+    """Yield a power of the coordinate's size, from several exponents."""
     x = curve.places[0]
     size = float(np.abs(curve.values(np.quantile(x, (0.1, 0.5, 0.9)))).max()) or 1.0
     most = float(np.abs(np.quantile(x, (0.01, 0.99))).max()) or 1.0
@@ -62,7 +62,7 @@ def powers(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
 
 
 def _read_fixed(text: str) -> tuple[Node, list[float]]:
-    """Read a form in which a number with @ behind it stays as it is."""
+    """Parse a form in which a number followed by @ stays literal."""
     fixed: dict[str, Node] = {"x": ("x",)}
     for k in range(-1, 11):
         fixed[f"fixed_{k + 1}"] = ("n", float(k))
@@ -71,9 +71,9 @@ def _read_fixed(text: str) -> tuple[Node, list[float]]:
 
 
 def regression(curve: Curve, most: int, seed: int) -> tuple[list[tuple[Node, list[float]]], str]:
-    """What symbolic regression comes upon, of at most so many constants; or why it could not be run."""
+    """Run symbolic regression with at most so many constants; also return why it could not run."""
     if curve.splines[0].periodic:
-        return [], ""  # a formula of an angle has to close: waves and bumps do
+        return [], ""  # a formula of an angle must be periodic, as waves and bumps are
     try:
         from pyoperon.sklearn import SymbolicRegressor
     except ImportError:
@@ -96,9 +96,9 @@ def regression(curve: Curve, most: int, seed: int) -> tuple[list[tuple[Node, lis
         random_state=seed,
     )
     regressor.fit((x / wide)[:, None], y / size)
-    found = []
-    for one in regressor.pareto_front_:
-        text = regressor.get_model_string(one["tree"], 8)
+    result = []
+    for individual in regressor.pareto_front_:
+        text = regressor.get_model_string(individual["tree"], 8)
         try:
             node, values = read(text, {"X1": ("x",)})
         except ValueError:
@@ -106,16 +106,16 @@ def regression(curve: Curve, most: int, seed: int) -> tuple[list[tuple[Node, lis
         values.append(size)
         node = simplify(scaled(("*", ("c", len(values) - 1), node), wide, values), values)
         if 0 < len(constants(node)) <= most:
-            found.append((node, values))
-    return found, ""
+            result.append((node, values))
+    return result, ""
 
 
 def _sample(curve: Curve) -> Array:
-    """Places as dense as the curve is well known, where there are data."""
+    """Sample places with a density that grows with the curve's precision, within the data."""
     low, high = np.quantile(curve.places[0], (0.002, 0.998))
     grid = np.linspace(low, high, 600)
     errors = curve.errors(grid)
-    # Where the known model can do all that the curve does, it is known without error.
+    # Where the known model can absorb all of the curve, its error would be zero.
     weight = np.cumsum(1.0 / np.maximum(errors, (_SURE * errors.max()) or 1.0) ** 2)
     result: Array = np.interp((np.arange(_PLACES) + 0.5) / _PLACES, weight / weight[-1], grid)
     return result

@@ -1,4 +1,4 @@
-"""A short formula for a curve: what could have made it, weighed against the curve itself."""
+"""Short formulas for a curve, compared with the curve itself."""
 
 from __future__ import annotations
 
@@ -32,13 +32,14 @@ from .formula_proposals import powers, regression, usual
 
 Array = NDArray[np.float64]
 
-_MOST = 12  # formulas looked at closely
-_FAR = 40.0  # nats below the curve, from which shortening does not bring a formula back
+_MOST = 12  # formulas that are shortened
+_FAR = 40.0  # nats below the curve, beyond which shortening cannot rescue a formula
 _HUGE = 1e6
-_STEP = math.sqrt(np.finfo(float).eps)  # of a constant, to see what it does
-_POSITIONS, _BETWEEN = 160, 223  # of the curve, where formulas are fitted, and where they are asked again
+_STEP = math.sqrt(np.finfo(float).eps)  # relative step of a constant in difference quotients
+# places of the curve at which formulas are fitted, and at which they are tested
+_POSITIONS, _BETWEEN = 160, 223
 _MOST_CONSTANTS = 12
-_NAMES = "abcdpqrsuvwzfghjklmn"  # of constants; enough where a model's states have taken some
+_NAMES = "abcdpqrsuvwzfghjklmn"  # names of constants; enough even if a model's states use some
 _EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 0.5, -1.0)
 #: Coordinates that are never negative.
 _POSITIVE = ("|Omega|", "R")
@@ -46,22 +47,22 @@ _POSITIVE = ("|Omega|", "R")
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula for a curve.
+    """Formula for a curve.
 
     Attributes
     ----------
     text : str
-        In the grammar of effects, its constants by name.
+        In the grammar of effects, with named constants.
     parameters : dict of str to float
         The constants' values, SI units.
     amplitudes : tuple of str
-        Those to which it is proportional, taken together.
+        Those to which it is jointly proportional.
     nats : float
-        By how much the formula, its length and constants paid for, is more likely than the smooth curve.
+        Log evidence relative to the smooth curve, with the price of its length and constants.
     node : tuple
         See :mod:`udd.discovery.symbolic.expressions`.
     variable : str
-        What its coordinate is called.
+        Name of its coordinate.
     """
 
     text: str
@@ -72,22 +73,22 @@ class Formula:
     variable: str
 
     def values(self, x: Array) -> Array:
-        """The formula at places of the curve's coordinate."""
+        """Evaluate the formula at places of the curve's coordinate."""
         return evaluate(self.node, np.asarray(x, dtype=np.float64), list(self.parameters.values()))
 
 
 @dataclass(frozen=True)
 class Formulas:
-    """What could have made a curve.
+    """Formulas that may have generated a curve.
 
     Attributes
     ----------
     formulas : list of Formula
-        The most likely first.
+        The most probable first.
     identified : bool
-        Whether the first is at most 10 nats less likely than the curve.
+        True if the first is at most 10 nats less probable than the curve.
     note : str
-        What could not be tried; empty otherwise.
+        Methods that could not be tried; else empty.
     """
 
     formulas: list[Formula]
@@ -96,45 +97,49 @@ class Formulas:
 
 
 def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collection[str] = ()) -> Formulas:
-    """Short formulas for a curve of one coordinate.
+    """Search short formulas for a curve of one coordinate.
 
-    Usual forms (powers, steps, bumps, waves) and those that symbolic regression comes upon (pyoperon, where
-    it is installed) are fitted to the curve's coefficients with their full information, which knows what the
-    free parameters would take up; each constant is charged as the Bayesian information criterion does, and
-    each operation by its description length. Needless constants are taken out again.
+    Usual forms (powers, steps, bumps, waves) and those from symbolic regression (pyoperon, if installed) are
+    fitted to the curve's coefficients with their full information, which accounts for confounding with the
+    free parameters. Each constant costs as much as in the Bayesian information criterion, and each operation
+    its description length. Needless constants are removed.
 
     Parameters
     ----------
     curve : Curve
     observations : int
-        Numbers in the record.
+        Count of observed numbers in the record.
     seed : int
-        Of the regression.
+        Seed of the regression.
     taken : collection of str
-        Names that constants may not have: a model's states'.
+        Names that constants may not have: those of a model's states.
     """
     if len(curve.coordinates) != 1:
         return Formulas([], False, "no formula is sought for a surface")
     target = _Target(curve, observations)
-    found, note = regression(curve, _MOST_CONSTANTS, seed)
+    regressed, note = regression(curve, _MOST_CONSTANTS, seed)
     trials = []
-    for node, values in itertools.chain(usual(curve), found):
+    for node, values in itertools.chain(usual(curve), regressed):
         node = simplify(without_sign(node) if curve.coordinates[0].name in _POSITIVE else node, values)
         fitted = target.fit(node, values) if target.takes(node) else None
         if fitted is not None:
             trials.append(fitted)
-    near = [one for one in _different(trials, target.x) if one.nats > curve.evidence - _FAR][:_MOST]
-    ranked = _different([target.shorten(one) for one in near], target.x)
+    shortlist = [
+        candidate for candidate in _different(trials, target.x) if candidate.nats > curve.evidence - _FAR
+    ][:_MOST]
+    ranked = _different([target.shorten(candidate) for candidate in shortlist], target.x)
     free = [name for name in _NAMES if name not in taken]
-    formulas = [_formula(curve, one, free) for one in ranked]
-    best = max((one.nats for one in formulas), default=-math.inf)
+    formulas = [_formula(curve, candidate, free) for candidate in ranked]
+    best = max((candidate.nats for candidate in formulas), default=-math.inf)
     return Formulas(
-        [one for one in formulas if one.nats > best - EVIDENCE_MARGIN], best > -EVIDENCE_MARGIN, note
+        [candidate for candidate in formulas if candidate.nats > best - EVIDENCE_MARGIN],
+        best > -EVIDENCE_MARGIN,
+        note,
     )
 
 
 def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> Formula | None:
-    """Fit a power with a free exponent to a curve; None where none can be fitted.
+    """Fit a power with a free exponent to a curve; None if no fit succeeds.
 
     It is the rival of every law that grows with its coordinate.
 
@@ -150,35 +155,42 @@ def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> F
         fitted = target.fit(without_sign(node) if positive else node, values)
         if fitted is not None:
             trials.append(fitted)
-    best = max(trials, key=lambda one: one.nats, default=None)
+    best = max(trials, key=lambda candidate: candidate.nats, default=None)
     if best is None:
         return None
     return _formula(curve, best, [name for name in _NAMES if name not in taken])
 
 
 def without(formula: Formula, name: str) -> Formula | None:
-    """Return a formula without the term of one of its amplitudes; None where nothing would be left."""
+    """Return a formula without the term of one of its amplitudes; None if nothing would remain."""
     names = list(formula.parameters)
     values = list(formula.parameters.values())
     if name not in formula.amplitudes:
         return None
     node = simplify(put(formula.node, names.index(name), 0.0), values)
-    left = [names[k] for k in constants(node) if k < len(names)]
-    if not left or len(left) != len(constants(node)) or not amplitudes(node):
+    remaining = [names[k] for k in constants(node) if k < len(names)]
+    if not remaining or len(remaining) != len(constants(node)) or not amplitudes(node):
         return None
-    order = {names.index(one): k for k, one in enumerate(left)}
+    order = {names.index(kept_name): k for k, kept_name in enumerate(remaining)}
     shorter = _renumbered(node, order)
-    linear = tuple(one for one in left if order[names.index(one)] in amplitudes(shorter))
+    linear = tuple(
+        kept_name for kept_name in remaining if order[names.index(kept_name)] in amplitudes(shorter)
+    )
     variable = formula.variable
-    text = write(shorter, variable, dict(enumerate(left)))
+    text = write(shorter, variable, dict(enumerate(remaining)))
     return Formula(
-        text, {one: formula.parameters[one] for one in left}, linear, formula.nats, shorter, variable
+        text,
+        {kept_name: formula.parameters[kept_name] for kept_name in remaining},
+        linear,
+        formula.nats,
+        shorter,
+        variable,
     )
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """A formula with fitted constants and its nats over no curve."""
+    """Formula with fitted constants and its log evidence relative to no curve."""
 
     nats: float
     node: Node
@@ -186,21 +198,21 @@ class _Fitted:
 
 
 def _different(trials: list[_Fitted], x: Array) -> list[_Fitted]:
-    """The best first; of those that say the same only the best."""
+    """Sort formulas by evidence and drop equivalent ones."""
     kept: list[tuple[_Fitted, Array]] = []
     shapes: set[str] = set()
-    for one in sorted(trials, key=lambda f: -round(f.nats, 2)):
-        made = evaluate(one.node, x, one.values)
-        with np.errstate(invalid="ignore"):  # one that is infinite somewhere is like no other
+    for candidate in sorted(trials, key=lambda f: -round(f.nats, 2)):
+        made = evaluate(candidate.node, x, candidate.values)
+        with np.errstate(invalid="ignore"):  # a formula that is infinite somewhere is equivalent to no other
             same = any(np.abs(made - other).max() < 1e-3 * np.ptp(other) for _, other in kept)
-        if not same and shape(one.node) not in shapes:
-            kept.append((one, made))
-            shapes.add(shape(one.node))
-    return [one for one, _ in kept]
+        if not same and shape(candidate.node) not in shapes:
+            kept.append((candidate, made))
+            shapes.add(shape(candidate.node))
+    return [candidate for candidate, _ in kept]
 
 
 class _Target:
-    """The curve's coefficients as the score knows them, for formulas to be fitted to."""
+    """The curve's coefficients with their information from the score, as target of formula fits."""
 
     def __init__(self, curve: Curve, observations: int) -> None:
         places, spline = curve.places[0], curve.splines[0]
@@ -210,10 +222,10 @@ class _Target:
         root = np.sqrt(information[keep])
 
         def asked(positions: int) -> tuple[Array, Array]:
-            """Places of the curve, and what takes values there to coefficients."""
+            """Return places of the curve, and the matrix from values there to coefficients."""
             x = np.quantile(where, (np.arange(positions) + 0.5) / positions)
             design = spline.design(x)
-            # Where there are no data the coefficients go on smoothly.
+            # Without data the coefficients continue smoothly.
             weak = 1e-6 * np.trace(design.T @ design) / np.trace(curve.roughness)
             to_coefficients = np.linalg.solve(design.T @ design + weak * curve.roughness, design.T)
             return x, (root[:, None] * vectors[:, keep].T) @ to_coefficients
@@ -225,18 +237,18 @@ class _Target:
         self.price = math.log(observations) / 2
 
     def takes(self, node: Node) -> bool:
-        """Whether it would make a law, which is absent where its amplitudes are zero."""
+        """Return True if the formula can be a law, which vanishes with its amplitudes."""
         return bool(amplitudes(node)) and sensible(node, self.angle)
 
     def fit(self, node: Node, values: list[float]) -> _Fitted | None:
-        """The formula with fitted constants; none where it cannot be fitted."""
+        """Fit the formula's constants; None if the fit fails."""
         numbers = constants(node)
         start = np.array([values[k] for k in numbers])
         if len(numbers) > len(self.target) or not np.isfinite(start).all():
             return None
 
         def residuals(thetas: Array, x: Array, matrix: Array) -> Array:
-            """At these places, a row for each column of constants."""
+            """Compute residuals at these places, one row for each column of constants."""
             given: list[float | Array] = list(values)
             for k, column in zip(numbers, thetas, strict=True):
                 given[k] = column[:, None]
@@ -251,7 +263,7 @@ class _Target:
             return result
 
         def slopes(theta: Array) -> Array:
-            """All of them from one evaluation."""
+            """Compute all derivatives from one evaluation."""
             steps = np.where(theta < 0, -_STEP, _STEP) * np.maximum(1.0, np.abs(theta))
             thetas = np.column_stack([theta, theta[:, None] + np.diag(steps)])
             here, *moved = residuals(thetas, self.x, self.matrix)
@@ -264,7 +276,7 @@ class _Target:
         for k, value in zip(numbers, solved.x, strict=True):
             result[k] = float(value)
         gain = float(self.target @ self.target - solved.fun @ solved.fun) / 2
-        # A wave that fits only the places where it was fitted does otherwise between them.
+        # A wave that fits only at the fitted places deviates between them.
         between = residuals(solved.x[:, None], *self.between)[0]
         lost = float(between @ between - solved.fun @ solved.fun) / 2
         if lost >= max(gain / 2, EVIDENCE_MARGIN):
@@ -272,7 +284,7 @@ class _Target:
         return _Fitted(gain - self.price * len(numbers) - price(node), node, result)
 
     def shorten(self, fitted: _Fitted) -> _Fitted:
-        """Take out constants one by one as long as that pays."""
+        """Remove constants one by one while that pays."""
         improved = True
         while improved:
             improved = False
@@ -281,7 +293,7 @@ class _Target:
                     values = list(fitted.values)
                     node = simplify(put(fitted.node, number, value), values)
                     trial = self.fit(node, values) if self.takes(node) else None
-                    # A factor has a unit: it may become 1 only where another one does its work.
+                    # A factor has a unit: it may become 1 only if another one replaces it.
                     least = self.price - 0.1 if value == 1.0 and number not in exponents(fitted.node) else 0.0
                     if trial is not None and trial.nats > fitted.nats + least:
                         fitted, improved = trial, True
@@ -295,12 +307,12 @@ def _formula(curve: Curve, fitted: _Fitted, free: Sequence[str]) -> Formula:
     numbers = constants(fitted.node)
     order = {number: k for k, number in enumerate(numbers)}
     names = {number: free[k] for number, k in order.items()}
-    own = curve.coordinates[0]
-    text = write(fitted.node, own.text, names)
+    coord = curve.coordinates[0]
+    text = write(fitted.node, coord.text, names)
     parameters = {names[number]: fitted.values[number] for number in numbers}
     linear = tuple(names[number] for number in numbers if number in amplitudes(fitted.node))
     nats = fitted.nats - curve.evidence
-    return Formula(text, parameters, linear, nats, _renumbered(fitted.node, order), own.text)
+    return Formula(text, parameters, linear, nats, _renumbered(fitted.node, order), coord.text)
 
 
 def _renumbered(node: Node, order: dict[int, int]) -> Node:

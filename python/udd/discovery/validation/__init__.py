@@ -1,1 +1,1 @@
-"""Held-out data decide: forecasts, confirmation, and what a sensor or a camera would do."""
+"""Validation on held-out data: forecasts, confirmation, and faults of sensor or camera."""

@@ -1,4 +1,4 @@
-"""What each of several records says of an effect that was found in all of them together."""
+"""Evidence of each of several records for an effect that was found in all of them together."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from udd.effects import Effect
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, released
 
-#: Whether a record wants an effect; one that could not show it if it were there as strong cannot tell.
+#: Answer of a record: `wants it` if the effect is significant in it; `cannot tell` if an effect of the same
+#: strength could not be detected.
 Answer = Literal["wants it", "does not want it", "cannot tell"]
 
 
 @dataclass(frozen=True)
 class RecordAnswer:
-    """What one record says of an effect.
+    """Evidence of one record for an effect.
 
     Attributes
     ----------
     record : int
-        Its number among the measurements that were given.
+        Number of the record among the given measurements.
     answer : {"wants it", "does not want it", "cannot tell"}
     parameters, errors : dict of str to float
-        The amplitudes fitted to this record, all else common to the records, with standard errors in which
-        the scatter counts that the model leaves.
+        Amplitudes fitted to this record, everything else common to the records. The standard errors include
+        the model's remaining scatter.
     """
 
     record: int
@@ -38,53 +39,55 @@ class RecordAnswer:
     errors: dict[str, float]
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the answer as JSON-ready values."""
         return dict(vars(self))
 
 
 def by_record(
-    known: Fit, found: Fit, effect: Effect, numbers: Sequence[int]
+    before: Fit, after: Fit, effect: Effect, numbers: Sequence[int]
 ) -> tuple[list[RecordAnswer], float]:
-    """Fit the amplitudes of an effect to each record apart, and test each against zero (Wald).
+    """Fit the amplitudes of an effect to each record separately, and test each against zero (Wald).
 
-    Everything else stays common to the records and is refitted beside them. A record that does not want the
-    effect could have shown it: were it there as strong as in the mean of the others, chance would hide it in
-    less than one case in a thousand.
+    Everything else stays common to the records and is refitted with them. A record answers `does not want it`
+    only if it could detect the effect: at the mean strength in the other records, chance would hide it with a
+    probability below 0.1 %.
 
     Parameters
     ----------
-    known, found : Fit
-        Of the same records, without what was found and with it.
+    before, after : Fit
+        Fits of the same records, without the added effects and with them.
     effect : Effect
-        One of those that `found` has and `known` lacks.
+        Effect that `after` has and `before` lacks.
     numbers : sequence of int
-        By which the user calls each record.
+        The user's number of each record.
 
     Returns
     -------
     answers : list of RecordAnswer
-        None where there is but one record, where the effect is a curve without amplitudes, or where it cannot
-        be fitted so.
+        Empty if there is only one record, if the effect is a curve without amplitudes, or if the fit fails.
     chi2 : float
-        Of the fit with amplitudes for each record, held as tightly as `known`; infinite where there is none.
+        chi2 of the fit with separate amplitudes, at the model error of `before`; infinite if there is no such
+        fit.
     """
-    films = np.unique(found.record.film).tolist()
-    names = {p: f"{effect.name}.{p}" for p in effect.amplitudes if f"{effect.name}.{p}" in found.parameters}
+    films = np.unique(after.record.film).tolist()
+    names = {p: f"{effect.name}.{p}" for p in effect.amplitudes if f"{effect.name}.{p}" in after.parameters}
     if len(films) < 2 or not names:
         return [], np.inf
-    apart = [
+    separate = [
         replace(f, name=f"{f.name}[{film}]", film=film)
-        for f in found.problem.free
+        for f in after.problem.free
         if f.name in names.values()
         for film in films
     ]
-    common = [f for f in found.problem.free if f.name not in names.values()]
+    common = [f for f in after.problem.free if f.name not in names.values()]
     try:
-        # `released` keeps what it does not know: the common amplitudes must go.
-        each = released(replace(found, problem=replace(found.problem, free=tuple(common))), [*common, *apart])
-        level = min(known.level, each.level)
+        # `released` keeps unknown parameters: the common amplitudes must be removed.
+        each = released(
+            replace(after, problem=replace(after.problem, free=tuple(common))), [*common, *separate]
+        )
+        level = min(before.level, each.level)
         compared = at_level(each, level)
-        inflation = compared.inflation(at_level(known, level))
+        inflation = compared.inflation(at_level(before, level))
     except FitError:
         return [], np.inf
     order = list(each.parameters)
@@ -92,25 +95,25 @@ def by_record(
     blocks = {film: [order.index(f"{name}[{film}]") for name in names.values()] for film in films}
     values = np.array(list(each.parameters.values()))
     covariance = inflation * each.covariance
-    for film, own in blocks.items():
-        information = np.linalg.pinv(covariance[np.ix_(own, own)])
-        # What the others have, each by its own weight.
+    for film, indices in blocks.items():
+        information = np.linalg.pinv(covariance[np.ix_(indices, indices)])
+        # Weighted mean of the amplitudes in the other records.
         rest = [other for other in films if other != film]
         weights = [np.linalg.pinv(covariance[np.ix_(blocks[o], blocks[o])]) for o in rest]
         pull = sum(w @ values[blocks[o]] for w, o in zip(weights, rest, strict=True))
         mean = np.linalg.pinv(sum(weights)) @ pull
-        limit = chi_squared.isf(ALPHA, len(own))
+        limit = chi_squared.isf(ALPHA, len(indices))
         answer: Answer = "cannot tell"
-        if values[own] @ information @ values[own] > limit:
+        if values[indices] @ information @ values[indices] > limit:
             answer = "wants it"
         elif mean @ information @ mean > 4 * limit:
             answer = "does not want it"
-        errors = np.sqrt(np.diag(covariance)[own])
+        errors = np.sqrt(np.diag(covariance)[indices])
         result.append(
             RecordAnswer(
                 numbers[film],
                 answer,
-                dict(zip(names, values[own].tolist(), strict=True)),
+                dict(zip(names, values[indices].tolist(), strict=True)),
                 dict(zip(names, errors.tolist(), strict=True)),
             )
         )
@@ -118,30 +121,30 @@ def by_record(
 
 
 def sentence(title: str, answers: Sequence[RecordAnswer]) -> str:
-    """Which of the records want an effect, in words."""
+    """Summarise in which of the records an effect is significant."""
     wants = [a.record for a in answers if a.answer == "wants it"]
     silent = [a.record for a in answers if a.answer == "cannot tell"]
-    unsure = f"; {_records(silent)} cannot tell" if silent else ""
+    unsure = f"; {_records(silent)} cannot show it" if silent else ""
     if len(wants) + len(silent) == len(answers) or len(wants) != 1:
-        return f"{title}: wanted by {len(wants)} of {len(answers)} records{unsure}."
-    return f"{title}: only {_records(wants)} wants it{unsure}."
+        return f"{title}: significant in {len(wants)} of {len(answers)} records{unsure}."
+    return f"{title}: significant only in {_records(wants)}{unsure}."
 
 
 def belief(effects: Sequence[tuple[str, Sequence[RecordAnswer]]]) -> str:
-    """What several records together say of what was found, and apart from it what only some of them want.
+    """Summarise which effects all records support, and which only some of them do.
 
     Parameters
     ----------
     effects : sequence of (str, list of RecordAnswer)
-        Titles, and what each record says.
+        Titles, and the records' answers.
     """
     shared = [title for title, answers in effects if not contested(answers)]
-    told = " and ".join(shared) if shared else "none of what was found"
-    apart = [sentence(title, answers) for title, answers in effects if contested(answers)]
+    supported = " and ".join(shared) if shared else "none of the effects found"
+    contested_effects = [sentence(title, answers) for title, answers in effects if contested(answers)]
     said = [
-        f"What we would believe of all records: {told}.",
-        *(["Apart from that:"] if apart else []),
-        *apart,
+        f"Supported by all records: {supported}.",
+        *(["Not by all:"] if contested_effects else []),
+        *contested_effects,
     ]
     return " ".join(said) if effects else ""
 
@@ -152,5 +155,5 @@ def _records(numbers: Sequence[int]) -> str:
 
 
 def contested(answers: Sequence[RecordAnswer]) -> bool:
-    """Whether some record wants an effect that another one, which could show it, does not."""
+    """Return True if an effect is significant in some record but absent from another that could show it."""
     return any(a.answer == "does not want it" for a in answers)

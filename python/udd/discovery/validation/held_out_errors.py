@@ -1,4 +1,4 @@
-"""Held-out errors: how far a model's free runs are from data that it was not fitted to."""
+"""Held-out errors: the distance of a model's free runs from data that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Array = NDArray[np.float64]
 #: A ratio and its 95 % interval.
 Ratio = tuple[float, float, float]
 
-_AT_ONCE = 4_000_000  # numbers that resampled blocks take up together
+_AT_ONCE = 4_000_000  # numbers in memory at a time for resampled blocks
 _EVERY = 0.2  # s between starts
 _BLOCK = 4.0  # s; starts within a block are resampled together
-_FEWEST, _SHORT = 3, 6  # blocks that an interval takes, and that a short record is cut into
-_INTEGRATED = 1e-6  # of a state's spread that free runs are off by because of how they are integrated
-_FLOOR = 1.5  # times the noise floor that an error may be and still be noise
-_LOST = 0.7  # of the motion's size that a free run is off where it has lost the motion
-_BLOWN_UP = 1e6  # what a free run is off by from where its solution blows up
+_FEWEST, _SHORT = 3, 6  # minimum of blocks for an interval, and blocks of a short record
+_INTEGRATED = 1e-6  # numerical error of free runs, as a share of a state's spread
+_FLOOR = 1.5  # ratio to the noise floor up to which an error counts as noise
+_LOST = 0.7  # share of the motion's size beyond which a free run has lost the motion
+_BLOWN_UP = 1e6  # error of a free run after its solution diverges
 _COST_BLOCK = 2.0  # s; the same for the costs of frames, which do not overlap
 
 
@@ -39,8 +39,8 @@ class Errors:
     Attributes
     ----------
     unit : str
-        ``"m"`` of the disk's centre, ``"rad"`` of a pendulum's angle, ``"spread"`` of a user's own model: the
-        root mean square over the states that are seen, each in units of its standard deviation.
+        ``"m"`` for the disk's centre, ``"rad"`` for a pendulum's angle, ``"spread"`` for a user's own model:
+        the root mean square over the observed states, each in units of its standard deviation.
     horizons : tuple of float
         Length of the free runs, s.
     median : ndarray (h,)
@@ -48,14 +48,14 @@ class Errors:
     low, high : ndarray (h,)
         95 % interval of the median, from a bootstrap over blocks.
     floor : ndarray (h,)
-        What a model without fault would score: the noise of the data and of the filtered start alone.
+        Error of a perfect model: the noise of the data and of the filtered start alone.
     samples : ndarray (starts, h)
-        The errors; NaN where the frame was not seen.
+        The errors; NaN if the frame was not observed.
     blocks : ndarray of int (starts,)
         Starts with the same number are resampled together.
     run : ndarray (n,)
-        Error of one free run over all held-out frames, from where the fit ended; NaN where a frame was not
-        seen.
+        Error of one free run over all held-out frames, from the end of the fit; NaN if a frame was not
+        observed.
     run_blocks : ndarray of int (n,)
         Frames with the same number are resampled together.
     """
@@ -72,7 +72,7 @@ class Errors:
     run_blocks: NDArray[np.int64]
 
     def __repr__(self) -> str:
-        """In a line: the median errors at the horizons."""
+        """Describe the median errors at the horizons on one line."""
         unit = "spreads" if self.unit == "spread" else self.unit
         each = ", ".join(
             f"{e:.3g} {unit} at {h:.3g} s" for h, e in zip(self.horizons, self.median, strict=True)
@@ -85,12 +85,12 @@ class Errors:
         return float(_rms(self.run))
 
     def at(self, horizon: float) -> tuple[float, float, float, float]:
-        """``(median, low, high, floor)`` at one of the horizons."""
+        """Return ``(median, low, high, floor)`` at one of the horizons."""
         k = self.horizons.index(horizon)
         return float(self.median[k]), float(self.low[k]), float(self.high[k]), float(self.floor[k])
 
     def to_dict(self) -> dict[str, Any]:
-        """What a machine reads."""
+        """Return the errors as JSON-ready values."""
         keys = ("median", "low", "high", "floor")
         rows = [
             {"horizon_s": h, **{key: float(getattr(self, key)[k]) for key in keys}}
@@ -102,10 +102,9 @@ class Errors:
 def held_out_errors(
     fit: Fit, record: Record, held_out: NDArray[np.bool_], seed: int = 0, unit: float = 1.0
 ) -> Errors:
-    """Errors of a fitted model on the frames of `record` that are held out.
+    """Compute the errors of a fitted model on the held-out frames of `record`.
 
-    Each free run starts from a state that is filtered from the second of data before it; absolute time is
-    kept.
+    Each free run starts from a state that is filtered from the second of data before it; time stays absolute.
 
     Parameters
     ----------
@@ -114,7 +113,7 @@ def held_out_errors(
     record : Record
         The whole measurement's frames.
     held_out : ndarray of bool (n,)
-        Which frames are held out: the last ones of each measurement, or all of some.
+        Held-out frames: the last ones of each measurement, or all of some.
     unit : float
         See :func:`udd.fitting.time_scale.motion_time_scale`.
     """
@@ -127,8 +126,8 @@ def held_out_errors(
     times = record.t[ends]
     seen = np.where(record.observed[ends], record.seen[ends], np.nan)
     there = _comparable(fit, record)[ends]
-    found = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
-    samples = np.where(there, _distance(fit, record, found, seen), np.nan)
+    predictions = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
+    samples = np.where(there, _distance(fit, record, predictions, seen), np.nan)
 
     floor = _floor(fit, record, windows, ends, firsts, seed)
     rng = np.random.default_rng(seed)
@@ -150,14 +149,14 @@ def held_out_errors(
 
 
 def block_numbers(record: Record, length: float) -> NDArray[np.int64]:
-    """The number of the stretch of `length` s that each frame lies in, of each measurement its own."""
-    own = ((record.t - record.t.min()) // length).astype(np.int64)
-    result: NDArray[np.int64] = own + record.film * (int(own.max()) + 1)
+    """Return the number of the block of `length` s of each frame, separate for each measurement."""
+    block = ((record.t - record.t.min()) // length).astype(np.int64)
+    result: NDArray[np.int64] = block + record.film * (int(block.max()) + 1)
     return result
 
 
 def _blocks(record: Record, frames: NDArray[np.int64], length: float) -> NDArray[np.int64]:
-    """The stretches to resample that frames lie in; shorter ones where these would be too few for it."""
+    """Return the blocks to resample for frames; shorter ones if there would be too few."""
     result = block_numbers(record, length)[frames]
     if len(np.unique(result)) >= _FEWEST:
         return result
@@ -167,15 +166,15 @@ def _blocks(record: Record, frames: NDArray[np.int64], length: float) -> NDArray
 
 
 def _held_out_of(record: Record, held_out: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """The frames that are held out, of each measurement that has some."""
+    """Return the held-out frames of each measurement that has some."""
     frames = (np.flatnonzero(held_out & (record.film == film)) for film in range(len(record.origins)))
-    return [own for own in frames if len(own)]
+    return [frames_of_film for frames_of_film in frames if len(frames_of_film)]
 
 
 def comparison_horizon(errors: Errors) -> float:
-    """The horizon at which models are compared: a second of the disk, or the nearest below that there is, s.
+    """Return the horizon at which models are compared, s: for the disk 1 s, or the longest below.
 
-    Of a user's own model it is the third that there is.
+    For a user's own model it is the third horizon.
     """
     if errors.unit == "spread":
         return errors.horizons[:3][-1]
@@ -183,32 +182,33 @@ def comparison_horizon(errors: Errors) -> float:
 
 
 def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> Ratio:
-    """The ratio of the median errors at a horizon, after over before, with its 95 % interval."""
+    """Compute the ratio of the median errors at a horizon, after over before, with its 95 % interval."""
     k = before.horizons.index(horizon)
-    both = np.column_stack([after.samples[:, k], before.samples[:, k]])
-    return _ratio(before.blocks, both, _median, seed)
+    samples = np.column_stack([after.samples[:, k], before.samples[:, k]])
+    return _ratio(before.blocks, samples, _median, seed)
 
 
 def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> Ratio:
-    """The ratio of the errors of the free run over all held-out frames, with its 95 % interval."""
+    """Compute the ratio of the errors of the free run over all held-out frames, with its 95 % interval."""
     return _ratio(before.run_blocks, np.column_stack([after.run, before.run]), _rms, seed)
 
 
 def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0) -> Ratio:
-    """The ratio of two fits' costs on a record that neither saw, with its 95 % interval from paired blocks.
+    """Compute the ratio of two fits' costs on a held-out record, with its 95 % interval from paired blocks.
 
-    The costs are those of :func:`udd.fitting.frame_costs`. They tell two models apart where
-    their forecasts are still equally good.
+    The costs are those of :func:`udd.fitting.frame_costs`. They distinguish two models even if their
+    forecasts are equally good.
     """
     costs = np.column_stack([after, before])
     return _ratio(block_numbers(record, _COST_BLOCK * unit), costs, _sum, seed)
 
 
 def confirmed(before: Errors, ratio: Ratio) -> bool:
-    """Whether free runs on held-out data confirm a claim: their errors' ratio is below 1 with 95 %.
+    """Return True if free runs on held-out data confirm a claim: the interval of the error ratio is below 1.
 
-    Where the known model's runs are no worse than noise makes them they cannot show a small effect, and must
-    but not contradict it; over a pendulum's whole run it adds up. No interval confirms nothing.
+    If the known model's runs are already at the noise floor, they cannot show a small effect, and only must
+    not contradict it; for a pendulum the effect accumulates over the whole run. Without an interval nothing
+    is confirmed.
     """
     _value, low, high = ratio
     if not np.isfinite(high) or low > 1.0:
@@ -217,17 +217,17 @@ def confirmed(before: Errors, ratio: Ratio) -> bool:
 
 
 def reaches_noise_floor(errors: Errors, horizon: float) -> bool:
-    """Whether errors are no larger than noise makes them, give or take a half, or than integration does."""
+    """Return True if errors are within a factor 1.5 of the noise floor, or of the integration error."""
     median, low, _high, floor = errors.at(horizon)
     least = _INTEGRATED if errors.unit == "spread" else 0.0
     return bool((low if np.isfinite(low) else median) <= max(_FLOOR * floor, least))
 
 
 def lacks_more(fit: Fit, errors: Errors) -> bool:
-    """Whether something is missing beside the effects that were found.
+    """Return True if something is missing in addition to the added effects.
 
-    They leave more than noise; or, of a user's own model, whose terms may together pass for what is none of
-    them, innovations are not white and free runs not as good as noise allows.
+    The residuals exceed the noise. Or, for a user's own model, whose terms together may imitate a missing
+    one, the innovations are not white and free runs are above the noise floor.
     """
     if fit.scatter > UNEXPLAINED:
         return True
@@ -236,9 +236,9 @@ def lacks_more(fit: Fit, errors: Errors) -> bool:
 
 
 def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_]) -> bool:
-    """Whether free runs miss by the size of the motion, where noise does not: no such model is complete.
+    """Return True if free runs miss by the size of the motion, and noise does not explain that.
 
-    Of a pendulum over the whole held-out part, else at the horizon of comparison.
+    For a pendulum this refers to the whole held-out part, else to the horizon of comparison.
     """
     if errors.unit == "rad":
         error, floor = errors.whole, float(errors.floor[-1])
@@ -249,15 +249,15 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
         complete = held_out & record.observed.all(axis=1)
         places = record.seen[complete][:, : 2 if errors.unit == "m" else 1]
         size = float(np.sqrt(places.var(axis=0).sum()))
-    # A model whose runs all blow up makes no data of its own, and has no floor.
+    # If all runs of a model diverge, it has no simulated data and no floor.
     return bool(error > _LOST * size and not floor >= 0.5 * _LOST * size)
 
 
-def _ratio(blocks: NDArray[np.int64], both: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:
-    def ratio(one: Array, other: Array) -> Array:
-        return measure(one) / measure(other)
+def _ratio(blocks: NDArray[np.int64], columns: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:
+    def ratio(first: Array, second: Array) -> Array:
+        return measure(first) / measure(second)
 
-    return (float(ratio(*both.T)), *_interval(blocks, both, ratio, np.random.default_rng(seed)))
+    return (float(ratio(*columns.T)), *_interval(blocks, columns, ratio, np.random.default_rng(seed)))
 
 
 def _windows(
@@ -267,34 +267,34 @@ def _windows(
     window: float,
     often: float = _EVERY,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[float, ...]]:
-    """Windows of frames to filter, the frames where their free runs are compared, and the horizons."""
+    """Return windows of frames to filter, the frames at which their free runs are compared, and horizons."""
     spans = _held_out_of(record, held_out)
-    longest = max(float(np.ptp(record.t[own])) for own in spans)
+    longest = max(float(np.ptp(record.t[frames])) for frames in spans)
     step = float(np.median(np.diff(record.t)))
     horizons = tuple(h for h in wanted if h <= longest / 3 and h >= step)
     if not horizons:
-        raise FitError(f"the held-out {longest:.2g} s are too short for a forecast: film for longer")
+        raise FitError(f"the held-out {longest:.2g} s are too short for a forecast; record for longer")
     windows, ends = [], []
     run = np.concatenate([[0], np.cumsum(~record.linked)])
-    for own in spans:
-        # Every measurement has a frame rate of its own.
-        step = float(np.median(np.diff(record.t[own])))
+    for frames in spans:
+        # Every measurement has a different frame rate.
+        step = float(np.median(np.diff(record.t[frames])))
         back, every = max(round(window / step), 6), max(round(often / step), 1)
         ahead = np.array([round(h / step) for h in horizons], dtype=np.int64)
-        for start in range(int(own[0]) + back, int(own[-1]) + 1 - int(ahead[-1]), every):
+        for start in range(int(frames[0]) + back, int(frames[-1]) + 1 - int(ahead[-1]), every):
             if run[start - back] == run[start + ahead[-1]]:
                 windows.append((start - back, start))
                 ends.append(start + ahead)
     if not windows:
         raise FitError(
-            f"the held-out {longest:.2g} s hold no {window + horizons[-1]:.2g} s "
-            "without a gap, which a forecast takes: film for longer"
+            f"the held-out {longest:.2g} s have no {window + horizons[-1]:.2g} s without a gap, which a "
+            "forecast needs; record for longer"
         )
     return np.array(windows, dtype=np.int64), np.array(ends, dtype=np.int64), horizons
 
 
 def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Array, Array]:
-    """States at the windows' first and last frames; as they were read where the model cannot be run there."""
+    """Filter states at the windows' first and last frames; return the states as read if that fails."""
     diffusion = fit.problem.schedule[fit.model.profile.discovery.filter_level]
     try:
         first, last, _covariance = filtered(fit, record, windows, diffusion)
@@ -303,32 +303,34 @@ def _filtered(fit: Fit, record: Record, windows: NDArray[np.int64]) -> tuple[Arr
         if len(windows) == 1:
             start, end = windows[0]
             return record.states[[start]], record.states[[end]]
-    each = [_filtered(fit, record, one[np.newaxis]) for one in windows]
+    each = [_filtered(fit, record, window[np.newaxis]) for window in windows]
     return np.concatenate([first for first, _last in each]), np.concatenate([last for _first, last in each])
 
 
-def _settled(record: Record, own: NDArray[np.int64], window: float) -> int:
-    """The frame of a measurement up to which its first state is filtered."""
-    ahead = np.searchsorted(record.t[own], record.t[own[0]] + window)
-    return int(own[min(max(int(ahead), 6), len(own) - 2)])
+def _settled(record: Record, frames: NDArray[np.int64], window: float) -> int:
+    """Return the frame of a measurement up to which its first state is filtered."""
+    ahead = np.searchsorted(record.t[frames], record.t[frames[0]] + window)
+    return int(frames[min(max(int(ahead), 6), len(frames) - 2)])
 
 
 def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_], window: float) -> Array:
-    """Error of free runs from the last fitted frame of each measurement to its end, frame by frame.
+    """Compute errors of free runs from the last fitted frame of each measurement to its end, frame by frame.
 
-    Of a measurement that is held out whole, from the state that its first frames show.
+    For a measurement that is held out whole, the run starts from the state that its first frames show.
     """
     errors = np.full(len(record.t), np.nan)
-    for own in _held_out_of(record, held_out):
-        film = record.film[own[:1]]
-        start, at = fit.states[fit.record.film == film][-1:], own[0] - 1
+    for frames in _held_out_of(record, held_out):
+        film = record.film[frames[:1]]
+        start, at = fit.states[fit.record.film == film][-1:], frames[0] - 1
         if not len(start):
-            at = _settled(record, own, window)
-            _first, start = _filtered(fit, record, np.array([[own[0], at]]))
-            own = own[own > at]
-        times = record.t[own][None, :]
-        found = predicted(fit.models, fit.point.sets, film, record.t[[at]], start, times)[0]
-        errors[own] = _distance(fit, record, found, np.where(record.observed[own], record.seen[own], np.nan))
+            at = _settled(record, frames, window)
+            _first, start = _filtered(fit, record, np.array([[frames[0], at]]))
+            frames = frames[frames > at]
+        times = record.t[frames][None, :]
+        prediction = predicted(fit.models, fit.point.sets, film, record.t[[at]], start, times)[0]
+        errors[frames] = _distance(
+            fit, record, prediction, np.where(record.observed[frames], record.seen[frames], np.nan)
+        )
     result: Array = np.where(_comparable(fit, record), errors, np.nan)[held_out]
     return result
 
@@ -336,12 +338,12 @@ def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_], window: float) -
 def _floor(
     fit: Fit, record: Record, windows: NDArray[np.int64], ends: NDArray[np.int64], first: Array, seed: int
 ) -> Array:
-    """Median errors of the same free runs on data that the model made itself, with the noise found.
+    """Compute median errors of the same free runs on simulated data with the estimated noise.
 
-    ``first`` holds the states at the windows' first frames, where the made runs start.
+    ``first`` has the states at the windows' first frames, at which the simulated runs start.
     """
     rng = np.random.default_rng(seed)
-    # All windows as long as the shortest: measurements may differ in their frame rates.
+    # All windows have the length of the shortest, because frame rates may differ.
     length = int((windows[:, 1] - windows[:, 0]).min()) + 1
     n, begins = len(windows), windows[:, 1] - length + 1
     first = np.where((begins == windows[:, 0])[:, None], first, record.states[begins])
@@ -353,14 +355,14 @@ def _floor(
         return np.full(ends.shape[1], np.nan)
     n, windows, ends, film = int(whole.sum()), windows[whole], ends[whole], film[whole]
     frames, made = frames[whole], made[whole]
-    # In a search the noise stays what the first model's misfits made it; where less remains it is less.
+    # In a search the noise stays that of the first model's misfits; if less remains, it is smaller.
     sd = fit.noise.sd(record, record.states[:, 0]) * math.sqrt(min(fit.scatter, 1.0))
     sd = np.minimum(sd, _shown(fit, record))[frames]
     made = made + np.where(np.isfinite(sd), sd, 0.0) * rng.standard_normal(made.shape)
 
-    # Windows overlap: each is laid out as frames of its own, linked to no other.
+    # Windows overlap: each gets separate frames, not linked to the others.
     inside = frames[:, :length].ravel()
-    own = replace(
+    simulated = replace(
         record,
         t=record.t[inside],
         seen=made[:, :length].reshape(n * length, -1),
@@ -373,7 +375,7 @@ def _floor(
         film=record.film[inside],
     )
     starts = length * np.arange(n)
-    _first, last = _filtered(fit, own, np.column_stack([starts, starts + length - 1]))
+    _first, last = _filtered(fit, simulated, np.column_stack([starts, starts + length - 1]))
     runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
     there = _comparable(fit, record)[ends]
     errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
@@ -382,23 +384,23 @@ def _floor(
 
 
 def _shown(fit: Fit, record: Record) -> Array | float:
-    """The noise of a record's frames as they show it themselves, (n, m): a search may assume more.
+    """Estimate the noise of a record's frames, (n, m), because a search may assume more.
 
-    Of a film of marks the search's is the frames' own.
+    For a film of marks a search uses the frames' own noise.
     """
     if fit.model.profile.sensor.sees_marks:
         return np.inf
     result = np.full(record.seen.shape, np.inf)
     for film in range(len(record.origins)):
-        own = record.film == film
+        in_film = record.film == film
         for channel, there in enumerate(record.observed.T):
-            if (own & there).any():
-                result[own, channel] = reads(record.seen[own & there, channel])[0]
+            if (in_film & there).any():
+                result[in_film, channel] = reads(record.seen[in_film & there, channel])[0]
     return result
 
 
 def _comparable(fit: Fit, record: Record) -> NDArray[np.bool_]:
-    """The frames in which two motions can be compared, (n,): of a user's own model any sensor will do."""
+    """Return the frames in which motions can be compared, (n,); for a user's model one sensor is enough."""
     seen = record.observed[:, record.observed.any(axis=0)]
     result: NDArray[np.bool_] = np.asarray(
         seen.any(axis=1) if fit.model.profile.written else seen.all(axis=1)
@@ -407,9 +409,9 @@ def _comparable(fit: Fit, record: Record) -> NDArray[np.bool_]:
 
 
 def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
-    """Distance of the disk's centres, of a pendulum's angles, or of states in units of their spread.
+    """Compute the distance of disk centres, of pendulum angles, or of states in units of their spread.
 
-    What a run gives is first; where that blew up it is far.
+    `a` is the run; after it diverged the distance is large.
     """
     difference = a - b
     result: Array
@@ -423,18 +425,18 @@ def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
     for k in np.flatnonzero(record.observed.any(axis=0)):
         spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
         angle = isinstance(fit.model, FormulaModel) and fit.channels[k] in fit.model.turning
-        own = wrapped(difference[..., k]) if angle else difference[..., k]
-        squares.append((own / (min(spread, 1.0) if angle else spread)) ** 2)
-    known = np.count_nonzero(np.isfinite(squares), axis=0)
-    result = np.sqrt(np.nansum(squares, axis=0) / np.where(known, known, np.nan))
+        error = wrapped(difference[..., k]) if angle else difference[..., k]
+        squares.append((error / (min(spread, 1.0) if angle else spread)) ** 2)
+    count = np.count_nonzero(np.isfinite(squares), axis=0)
+    result = np.sqrt(np.nansum(squares, axis=0) / np.where(count, count, np.nan))
     return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
 
 
 def _median(rows: Array) -> Array:
-    """Along the last axis, NaN left out; `nanmedian` takes longer, and this is taken of thousands of rows."""
+    """Compute the median along the last axis without NaN; faster than `nanmedian` for thousands of rows."""
     ordered = np.sort(rows, axis=-1)  # NaN comes last
-    known = np.count_nonzero(~np.isnan(rows), axis=-1)[..., None]
-    lower, upper = (np.take_along_axis(ordered, at, axis=-1) for at in ((known - 1) // 2, known // 2))
+    count = np.count_nonzero(~np.isnan(rows), axis=-1)[..., None]
+    lower, upper = (np.take_along_axis(ordered, at, axis=-1) for at in ((count - 1) // 2, count // 2))
     result: Array = (lower + upper)[..., 0] / 2
     return result
 
@@ -452,20 +454,20 @@ def _rms(rows: Array) -> Array:
 def _interval(
     blocks: NDArray[np.int64], columns: Array, measure: Callable[..., Array], rng: np.random.Generator
 ) -> tuple[float, float]:
-    """95 % interval of a statistic of columns (n, c), over resampled blocks of them."""
+    """Compute the 95 % interval of a statistic of columns (n, c), over resampled blocks."""
     numbers, counts = np.unique(blocks, return_counts=True)
     if len(numbers) < _FEWEST:
         return float("nan"), float("nan")
 
-    from scipy.stats import bootstrap  # takes half a second to import
+    from scipy.stats import bootstrap  # half a second to import
 
-    # Blocks of one length, for many resamplings at once: what they lack is as if it had not been seen.
+    # Blocks of one length, for many resamplings at once; missing frames count as not observed.
     groups = np.full((columns.shape[1], len(numbers), counts.max()), np.nan)
     for k, (number, count) in enumerate(zip(numbers, counts, strict=True)):
         groups[:, k, :count] = columns[blocks == number].T
 
     def statistic(chosen: NDArray[np.int64], axis: int) -> Array:  # of resamplings along the last axis
-        return measure(*(own[chosen].reshape(*chosen.shape[:-1], -1) for own in groups))
+        return measure(*(group[chosen].reshape(*chosen.shape[:-1], -1) for group in groups))
 
     interval = bootstrap(
         (np.arange(len(numbers)),),

@@ -1,4 +1,4 @@
-"""What a drifting sensor, or a support that moves, would explain of a model's misfit."""
+"""Misfit that a drifting sensor, or a moving support, would explain."""
 
 from __future__ import annotations
 
@@ -13,39 +13,42 @@ from udd.fitting.time_scale import correlation_time, takes_to_change
 
 Array = NDArray[np.float64]
 
-_INTERVALS = 28  # of the drift's cubic spline over a record, as many as a curve over time has
-_SLOW = 12.0  # times what the motion takes to change, that each of them lasts at least: two of its turns
+_INTERVALS = 28  # intervals of the drift's cubic spline over a record, as many as for a curve over time
+_SLOW = 12.0  # minimum length of an interval, in times in which the motion changes: two periods
 _FEWEST = 3
 
 
 def drift_gain(fit: Fit) -> float:
-    """The fall of chi2, in units of the fit's scatter, by a slow drift of what each channel calls zero.
+    """Compute the decrease in chi2, in units of the fit's scatter, by a slow drift of each channel's zero.
 
-    A lower bound, for the motion is held; zero where it is not worth the drift's freedom, or where the record
-    is too short to tell a drift from its motion.
+    It is a lower bound, because the motion is fixed. It is zero if it is below the price of the drift's
+    freedom, or if the record is too short to distinguish a drift from its motion.
     """
     sd = fit.noise.sd(fit.record, fit.blurring) / np.sqrt(np.maximum(fit.noise.weight, 1e-12))[:, None]
     change, total = correlation_time(fit), 0.0
     for film in np.unique(fit.record.film):
-        own = fit.record.film == film
-        t = fit.record.t[own]
-        for misfit, read, size in zip(fit.misfit[own].T, fit.record.seen[own].T, sd[own].T, strict=True):
+        in_film = fit.record.film == film
+        t = fit.record.t[in_film]
+        for misfit, read, size in zip(
+            fit.misfit[in_film].T, fit.record.seen[in_film].T, sd[in_film].T, strict=True
+        ):
             seen = np.isfinite(misfit)
-            # A drift is slow beside what this sensor sees of the motion: a tank's level is slow itself.
+            # A drift must be slow compared with the motion that this sensor shows: a tank's level is slow
+            # itself.
             slow = max(change, _about_its_trend(t[seen], (read - misfit)[seen]))
             number = min(_INTERVALS, int(float(np.ptp(t)) / (_SLOW * slow))) if slow > 0 else 0
             if number < _FEWEST or seen.sum() <= number + 3:
                 continue
             weighted = _splines(t, number)[seen] / size[seen, None]
             scaled = misfit[seen] / size[seen]
-            left = scaled - weighted @ np.linalg.lstsq(weighted, scaled, rcond=None)[0]
-            fall = float(scaled @ scaled - left @ left) / max(fit.scatter, 1.0)
+            remainder = scaled - weighted @ np.linalg.lstsq(weighted, scaled, rcond=None)[0]
+            fall = float(scaled @ scaled - remainder @ remainder) / max(fit.scatter, 1.0)
             total += fall if fall > price_of(fit) * weighted.shape[1] else 0.0
     return total
 
 
 def _about_its_trend(t: Array, values: Array) -> float:
-    """What a channel sees takes so long to change, about its trend."""
+    """Return the time in which a channel's signal changes, about its trend."""
     if len(t) < _FEWEST:
         return 0.0
     level = values - np.polyval(np.polyfit(t - t[0], values, 1), t - t[0])
@@ -54,7 +57,7 @@ def _about_its_trend(t: Array, values: Array) -> float:
 
 
 def _splines(t: Array, intervals: int) -> Array:
-    """Cubic B-splines over a record, (n, intervals + 3)."""
+    """Evaluate cubic B-splines over a record, (n, intervals + 3)."""
     inner = np.linspace(t[0], t[-1], intervals + 1)
     knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
     result: Array = BSpline.design_matrix(t, knots, 3).toarray()
@@ -65,28 +68,28 @@ FORETELLS = 0.5
 """The ratio of free runs' errors, at worst, from which on no random forces come into question."""
 
 
-def as_random(known: Fit, found: Fit) -> Fit | None:
+def as_random(before: Fit, after: Fit) -> Fit | None:
     """Compare a found law with random forces alone, by the evidence (marginal likelihood).
 
-    A moving support feeds random forces into a swing. If the swing hardly loses energy their trace lasts for
-    many turns and resembles a law. A right law needs no random forces: its evidence is largest at the
-    smallest model error. If a found law needs a larger one, its evidence must exceed that of the known model,
-    each at its likeliest model error. A disk is not tested: its camera sees all marks move.
+    A moving support feeds random forces into a swing. If the swing loses little energy, their trace lasts for
+    many periods and resembles a law. A right law needs no random forces: its evidence is largest at the
+    smallest model error. If a law needs a larger one, its evidence must exceed that of the known model, each
+    at its most probable model error. A disk is not tested: its camera sees all marks move.
 
     Parameters
     ----------
-    known, found : Fit
-        Of all data, without and with what was found, in a search.
+    before, after : Fit
+        Fits of all data, without and with the added effects, from a search.
 
     Returns
     -------
     Fit or None
-        None where they do not, or where no such forces are needed.
+        The fit with random forces; None if they do not explain the record as well, or are not needed.
     """
-    if found.model.profile.sensor.sees_marks:
+    if after.model.profile.sensor.sees_marks:
         return None
-    likeliest = eased(found)
-    tight = likeliest.level == len(likeliest.problem.schedule) - 1
-    if tight or likeliest.evidence - eased(known).evidence > EVIDENCE_MARGIN:
+    most_probable = eased(after)
+    tight = most_probable.level == len(most_probable.problem.schedule) - 1
+    if tight or most_probable.evidence - eased(before).evidence > EVIDENCE_MARGIN:
         return None
-    return likeliest
+    return most_probable
