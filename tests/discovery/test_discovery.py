@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -274,6 +275,9 @@ def test_what_comes_nearest_is_told_but_not_added():
         assert near.errors.whole < found.error_before.whole
     assert [near["name"] for near in found.to_dict()["refused"]] == [n.effect.name for n in found.rejected]
     assert "would bring the held-out error" in wording.rejected(found)[0]
+    twin = replace(found.rejected[0], title="its twin")
+    shared = wording.rejected(replace(found, rejected=[found.rejected[0], twin]))
+    assert len(shared) == 1 and " or its twin (" in shared[0]  # the same errors: one sentence for both
 
 
 def test_a_short_record_is_refused():

@@ -297,7 +297,7 @@ _NAMED = {
     "cubic_drag": Truth(*_SPEED, "power", 3.0),
     "coulomb": Truth(*_SPEED, "dry"),
     "stribeck": Truth(*_SPEED, "stribeck"),
-    "load_dry_friction": Truth("friction", "load", "load"),
+    "load_coulomb": Truth("friction", "load", "load"),
     "warming_friction": Truth("friction", "t", "decay"),
 }
 

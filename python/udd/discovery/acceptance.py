@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,7 +139,12 @@ class TestResult:
 def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
     """A proposal fitted to all data, from where a fit of these without it ended."""
     if trial.curve is None:
-        return of_library(whole, trial.candidates, trial.amplitudes)
+        added = trial.fit.model.effects[-len(trial.candidates) :]
+        shaped = [
+            replace(c, effect=e.replace(**dict.fromkeys(e.amplitudes, 0.0)))
+            for c, e in zip(trial.candidates, added, strict=True)
+        ]
+        return of_library(whole, shaped, trial.amplitudes)
     if trial.formula is None:
         return of_curve(whole, trial.curve)
     return of_formula(whole, trial.curve, trial.formula)
@@ -286,7 +291,11 @@ class Acceptance:
     def _formulas(self, fitted: Fit, curve: Curve) -> list[Formula]:
         taken, number = fitted.model.state_names, fitted.observations
         formulas = formulas_for(curve, number, taken=taken).formulas[:_FORMULAS]
-        power = power_for(curve, number, taken) if len(curve.coordinates) == 1 else None
+        name = curve.coordinates[0].name
+        # The library has the speed's.
+        if len(curve.coordinates) > 1 or name in (curve.slot.equation, f"|{curve.slot.equation}|"):
+            return formulas
+        power = power_for(curve, number, taken)
         return [*formulas, power] if power is not None else formulas
 
     def _in_other_widths(self, current: SearchState, trial: TrialFit, scanned: Scan) -> TrialFit:

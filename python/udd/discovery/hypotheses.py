@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.scoring.candidate import brakes_with_time
 from udd.discovery.scoring.look_alikes import by_parameter
-from udd.discovery.symbolic.expressions import is_power, length
+from udd.discovery.symbolic.expressions import length
 from udd.effects import Effect
 from udd.errors import ModelError
 from udd.fitting import Fit
@@ -78,15 +79,15 @@ class Hypothesis:
     def log_z(self) -> float:
         """Log evidence of all data, less what a curve's freedom costs, with the prior.
 
-        A film's geometry is not sure to the noise that shows: a curve or a formula pays as if that were what
-        a film's is taken to be at least, while laws of the library are told apart by what shows.
+        The geometry of a film is not sure to the noise that shows. A curve, a formula and a number that a
+        scan chose pay in units of what a film's geometry is taken to be at least; plain laws do not.
         """
-        unsure = 0.0
-        if self.trial.curve is not None:
-            # Without this a drag of a real pendulum's film is taken for a curve, by its geometry's faults.
-            fitted = self.again.fit
-            unsure = (self.prior - spent(self.again)) * (max(fitted.scatter, 1.0) / fitted.shown - 1.0)
-        return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior + unsure
+        fitted = self.again.fit
+        # Without this the quadratic drag of a real pendulum's film becomes a curve or a power.
+        unsure = max(fitted.scatter, 1.0) / fitted.shown - 1.0
+        scanned = sum(c.scanned for c in self.trial.candidates) * math.log(fitted.observations) / 2
+        cost = spent(self.again) + scanned - (self.prior if self.trial.curve is not None else 0.0)
+        return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior - cost * unsure
 
     @property
     def constants(self) -> int:
@@ -97,21 +98,15 @@ class Hypothesis:
 def log_prior(trial: TrialFit, terms: int) -> float:
     """Logarithm of a proposal's prior probability, where the library has so many terms.
 
-    A term of the library is one of these, and a power counts as one. A formula costs the nats that it takes
-    to write it down, and its coordinate. A spline says less than a law: it leads if it is far better.
+    A term of the library is one of these. A formula costs the nats that it takes to write it down, and its
+    coordinate. A spline says less than a law: it leads if it is far better. A term
+    that machines hardly have, and friction that changes with the time alone, must be five nats better.
     """
     single = -math.log(terms)
+    unusual = EVIDENCE_MARGIN / 2 * sum(not c.usual or brakes_with_time(c.effect) for c in trial.candidates)
     if trial.formula is not None:
-        return single - (0.0 if is_power_drag(trial) else _SYMBOL * length(trial.formula.node))
-    unusual = sum(not c.usual for c in trial.candidates)
-    return len(trial.candidates) * single - EVIDENCE_MARGIN * (trial.is_curve + unusual / 2)
-
-
-def is_power_drag(trial: TrialFit) -> bool:
-    """Return True if a proposal is friction that grows with a power of the speed."""
-    if trial.formula is None or trial.curve is None or not is_power(trial.formula.node):
-        return False
-    return trial.curve.slot.name == "friction" and trial.curve.coordinates[0].name == "|Omega|"
+        return single - unusual - _SYMBOL * length(trial.formula.node)
+    return len(trial.candidates) * single - unusual - EVIDENCE_MARGIN * trial.is_curve
 
 
 def contains(law: Hypothesis, other: Hypothesis, known: Sequence[str]) -> bool:

@@ -25,7 +25,6 @@ from .trial_fits import (
     of_curve,
     of_library,
     one_of_each,
-    price_of,
     with_more,
 )
 
@@ -123,25 +122,7 @@ class Proposals:
         self.clock.trying([candidate.title for candidate, _amplitudes in best])
         # A wrong candidate may take a hundred times as long as the right one, which usually comes first.
         first = self._in_full(best[:1])
-        return self._worthwhile(one_of_each(first + self._in_full(best[1:], self._beside(first))))
-
-    def _worthwhile(self, trials: list[TrialFit]) -> list[TrialFit]:
-        """Drop laws with a scanned number that explain hardly more than the best law without one.
-
-        A free power resembles every drag. If its gain is below half of its price in the training part, it is
-        below its price in all data.
-        """
-        # Without this half of a search's time goes to powers that compete with a quadratic drag.
-        plain = min((t for t in trials if not t.candidates[0].scanned), key=lambda t: t.rank, default=None)
-        if plain is None:
-            return trials
-        price = price_of(self.fit) / 2 * max(plain.fit.scatter, 1.0)
-
-        def leads(trial: TrialFit) -> bool:
-            level, chi2 = trial.rank
-            return (level, chi2 + price * trial.candidates[0].scanned) < plain.rank
-
-        return [t for t in trials if not t.candidates[0].scanned or leads(t)]
+        return one_of_each(first + self._in_full(best[1:], self._beside(first)))
 
     def _look_alikes(self, tried: list[TrialFit]) -> list[TrialFit]:
         """Fit candidates that act almost like the best trial along the motion, whatever their scores."""

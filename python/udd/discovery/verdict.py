@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.scoring.candidate import brakes_with_time
 from udd.discovery.validation.by_record import contested
 from udd.discovery.validation.held_out_errors import Ratio
 from udd.fitting import Fit
@@ -64,7 +64,8 @@ def doubts_of(found: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
             result.append(f"Only some of the records want {one.title}.")
         if one.like_a_drift(final.model):
             result.append(f"{one.title} may be the drift of a sensor's zero.")
-        if _brakes_with_time(one):
+        # Without this the friction of a pendulum with a power of 1.2 is identified as one that settles.
+        if brakes_with_time(one.effect):
             result.append(f"{one.title}: as a swing dies down, the time stands for its size as well.")
         if not one.is_law:
             result.append(f"{one.title} is a curve, written as a formula: no law of one term.")
@@ -76,12 +77,6 @@ def doubts_of(found: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
     if found and not has_size(ratio) and not any(_predicts(one.ratio, held_out) for one in found):
         result.append("Held-out data gain less than 2 %, and less than 10 nats.")
     return result
-
-
-def _brakes_with_time(one: AddedEffect) -> bool:
-    """Return True if an effect is friction as a function of the time alone."""
-    # Without this the friction of a pendulum with a power of 1.2 is identified as one that settles with time.
-    return one.effect.slots[0] == "friction" and bool(re.search(r"\b[tT]\b", one.equation))
 
 
 def has_size(ratio: Ratio) -> bool:

@@ -325,7 +325,7 @@ Pendulum.profile = ModelProfile(
         forecast_end=True,
         run_start=(0.0, 0.5),
         meanings={
-            "length": "length of the pendulum",
+            "length": "length of the pendulum; the period determines length/inertia alone",
             "inertia": "moment of inertia per unit mass",
             "g": "gravity",
             "k0": "viscous friction",

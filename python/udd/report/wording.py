@@ -125,8 +125,11 @@ def _counted(sentences: list[str]) -> list[str]:
 
 
 def rejected(discovery: Discovery) -> list[str]:
-    """What comes nearest where nothing passes, and why it does not."""
-    sentences = []
+    """Say what comes nearest if nothing passes, and why each does not pass.
+
+    Effects with the same errors and the same reason share a sentence.
+    """
+    groups: dict[tuple[str, ...], list[str]] = {}
     for near in discovery.rejected:
         numbers = headline(replace(discovery, error_after=near.errors, ratio=near.ratio))
         why = {
@@ -135,15 +138,17 @@ def rejected(discovery: Discovery) -> list[str]:
             "drift": "a slow drift of the sensor's zero would explain more",
             "part": "the part in which effects are sought does not show it beyond chance",
             "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
-            "held": "the frames that were held back do not bear it out",
+            "held": "the frames that were held back do not confirm it",
             "form": "another form fits these data clearly better, and does not pass",
-            "records": "only some of the records want it",
+            "records": "only some of the records need it",
         }[near.why]
-        sentences.append(
-            f"{near.title} ({near.effect.expression}) would bring the held-out error {numbers.span} from "
-            f"{numbers.before} to {numbers.after}, ratio {numbers.ratio} ({numbers.interval}), but {why}."
-        )
-    return sentences
+        key = (numbers.span, numbers.before, numbers.after, numbers.ratio, numbers.interval, why)
+        groups.setdefault(key, []).append(f"{near.title} ({near.effect.expression})")
+    return [
+        f"{' or '.join(names)} would bring the held-out error {span} from {before} to {after}, "
+        f"ratio {ratio} ({interval}), but {why}."
+        for (span, before, after, ratio, interval, why), names in groups.items()
+    ]
 
 
 def reaches_noise_floor(discovery: Discovery) -> bool:

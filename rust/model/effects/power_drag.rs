@@ -18,7 +18,7 @@ impl EffectLaw for PowerDrag {
         momenta: &[],
         parameters: &[
             EffectParameter::amplitude("a", "m^2/s").within(0.0, f64::INFINITY),
-            EffectParameter::scanned("n", "", 0.5, "power").within(0.2, 4.0),
+            EffectParameter::scanned("n", "", 0.5, "power").within(-0.95, 4.0),
         ],
     };
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from udd import effects
@@ -52,3 +53,11 @@ class Candidate:
     def amplitude_names(self) -> list[str]:
         """Names of the amplitudes among a model's parameters."""
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]
+
+
+def brakes_with_time(effect: effects.Effect) -> bool:
+    """Return True if an effect is friction as a function of the time alone.
+
+    As a swing dies down, the time stands for its size as well.
+    """
+    return effect.slots[0] == "friction" and bool(re.search(r"\b[tT]\b", effect.equation))

@@ -254,14 +254,6 @@ def length(node: Node) -> int:
     return sum(part[0] not in ("n", "c") for part in parts(node))
 
 
-def is_power(node: Node) -> bool:
-    """Return True if a formula is a constant times a power of its coordinate with a free exponent."""
-    if node[0] != "*" or node[1][0] != "c" or node[2][0] != "^":
-        return False
-    base, exponent = node[2][1:]
-    return base in (("x",), ("abs", ("x",))) and exponent[0] == "c"
-
-
 def is_single_term(node: Node) -> bool:
     """Return True if a formula is one term: a factor times one function of its coordinate, or one wave.
 
