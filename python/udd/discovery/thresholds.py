@@ -7,7 +7,7 @@ from typing import Literal
 #: Family-wise error rate: the probability of reporting an effect in a record without any, over all candidates
 #: together (Bonferroni: each is tested at this over their number).
 ALPHA = 1e-3
-#: Likeness above which forms have an identical effect on the data, such as a slip c Z and a relaxation -b W Z at
+#: Likeness above which forms act identically on the data, such as a slip c Z and a relaxation -b W Z at
 #: one drive.
 SAME = 1.0 - 1e-6
 #: Test by which data that were not fitted confirm an effect.
