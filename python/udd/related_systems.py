@@ -71,7 +71,7 @@ def lorenz(sigma: float = 10.0, r: float = 28.0, b: float = 8 / 3) -> Model:
 
     References
     ----------
-    E. N. Lorenz, J. Atmos. Sci. 20 (1963) 130.
+    E. N. Lorenz, J. Atmos. Sci. 20 (1963) 130 [2].
 
     Examples
     --------
@@ -168,7 +168,7 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
 
     References
     ----------
-    S. H. Strogatz, Nonlinear Dynamics and Chaos, section 9.1.
+    S. H. Strogatz, Nonlinear Dynamics and Chaos, section 9.1 [3].
 
     Examples
     --------
@@ -263,7 +263,7 @@ def torqued_pendulum(r: float, friction: float, amplitude: float, frequency: flo
 
     References
     ----------
-    G. L. Baker and J. P. Gollub, Chaotic Dynamics, chapter 3; it is chaotic at r = 1, friction = 1/2,
+    G. L. Baker and J. P. Gollub, Chaotic Dynamics, chapter 3 [4]; it is chaotic at r = 1, friction = 1/2,
     amplitude = 1.5, frequency = 2/3.
 
     Examples
@@ -414,7 +414,7 @@ def pumped_swing(
 
     References
     ----------
-    P. L. Tea and H. Falk, Am. J. Phys. 36 (1968) 1165.
+    P. L. Tea and H. Falk, Am. J. Phys. 36 (1968) 1165 [5].
 
     Examples
     --------
@@ -470,7 +470,7 @@ def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
 
     References
     ----------
-    C. Huygens, Horologium oscillatorium (1673), part 2.
+    C. Huygens, Horologium oscillatorium (1673), part 2 [6].
 
     Examples
     --------
@@ -521,7 +521,7 @@ def walking_droplet(R: float, memory: float = float("inf")) -> Model:
     References
     ----------
     R. N. Valani, Infinite-memory classical wave-particle entities, attractor-driven active particles, and the
-    diffusionless Lorenz equations, Chaos 34 (2024) 013133, arXiv:2308.03062.
+    diffusionless Lorenz equations, Chaos 34 (2024) 013133, arXiv:2308.03062 [7].
 
     Examples
     --------

@@ -133,8 +133,8 @@ def fit(
 
     References
     ----------
-    Weak-constraint 4D-Var: Y. Trémolet, Q. J. R. Meteorol. Soc. 132 (2006) 2483. Multiple shooting: H. G.
-    Bock, in "Modelling of Chemical Reaction Systems" (1981) 102.
+    Weak-constraint 4D-Var: Y. Trémolet, Q. J. R. Meteorol. Soc. 132 (2006) 2483 [47]. Multiple shooting:
+    H. G. Bock, in "Modelling of Chemical Reaction Systems" (1981) 102 [48].
 
     Examples
     --------

@@ -85,7 +85,8 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
 
     References
     ----------
-    Cook and Stefanski, "Simulation-extrapolation estimation in parametric measurement error models", 1994.
+    Cook and Stefanski, "Simulation-extrapolation estimation in parametric measurement error models" (1994)
+    [43].
 
     Examples
     --------

@@ -136,7 +136,8 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
 
     References
     ----------
-    JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement, 5.1.
+    JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement,
+    5.1 [44].
 
     Examples
     --------

@@ -68,7 +68,7 @@ class Disk(CompiledModel):
 
     References
     ----------
-    L. Maas, "The upward-driven disk, a steadily forced chaotic pendulum": its full model, with its
+    L. Maas, "The upward-driven disk, a steadily forced chaotic pendulum" [1]: the full model, with its
     constants as defaults.
 
     Examples
