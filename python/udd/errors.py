@@ -9,8 +9,8 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-_WORD, _ALL = 200, 500  # characters of one word or of what is repeated of the input, and of a message
-# What stands where something else is wanted first: it may hold all of the others.
+_WORD, _ALL = 200, 500  # characters of a word or a part of the input, and of a message
+# Parts of the input in a message. The first pattern may contain the others.
 _REPEATED = [
     re.compile(rf"{before}{{{_WORD},}}")
     for before in ("(?<=, not ).", r"(?:^|(?<= ))[\[{].", r"(?<= ')[^']", r'(?<= ")[^"]', r"\S")
@@ -23,7 +23,7 @@ class UddError(ValueError):
     Parameters
     ----------
     message : str
-        One sentence. What it repeats of the input is cut where that is long.
+        One sentence. Long parts of the input are cut.
     """
 
     def __init__(self, message: str = "", *more: object) -> None:
@@ -62,7 +62,7 @@ class ToleranceWarning(UserWarning):
 
 
 class StiffnessWarning(UserWarning):
-    """A run's steps are held down by stability, not by accuracy: another method is meant for it."""
+    """Stability limits the steps of a run, not accuracy: a method for stiff models is faster."""
 
 
 class IncompleteWarning(UserWarning):

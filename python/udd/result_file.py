@@ -1,8 +1,8 @@
 """Fits and discoveries as files that are read back without running anything in them.
 
 A file is NumPy's ``.npz``: the arrays, and one JSON text (`tree`, UTF-8) that says what they belong to. It
-lists objects, each once, parts before wholes; ``{"object": 3}`` and ``{"array": 5}`` stand for one of them.
-Only the types listed here are made when a file is read.
+lists objects, each once, parts before wholes; ``{"object": 3}`` and ``{"array": 5}`` refer to entries.
+Reading a file makes only the types listed here.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ from udd.models.profile import Coordinate
 from udd.models.serialization import effect_from_dict, effect_to_dict, model_from_dict, model_to_dict
 
 FORMAT = "udd result 1"
-"""To be changed with every change of what stands in a file."""
+"""Change it with every change of the content of a file."""
 
 _TYPES: dict[str, type] = {
     cls.__name__: cls
@@ -101,7 +101,7 @@ def save(result: Fit | Discovery, path: str | os.PathLike[str]) -> None:
     ----------
     result : Fit or Discovery
     path : path
-        File to write (``.npz``); one that stands there is replaced, by all of the new one or not at all.
+        File to write (``.npz``). An existing file is replaced by the complete new file, or stays.
 
     Raises
     ------
@@ -209,7 +209,7 @@ class _Writer:
         if isinstance(value, dict):
             return {"dict": [[self.value(k), self.value(x)] for k, x in value.items()]}
         if isinstance(value, _core.Linearised):
-            return None  # made anew where it is asked for
+            return None  # computed again on demand
         if id(value) not in self._places:
             self._places[id(value)] = (value, self._new(value))
         return self._places[id(value)][1]
@@ -239,7 +239,7 @@ class _Writer:
         if not is_dataclass(value) or _TYPES.get(name) is not type(value):
             raise ModelError(f"a result with a {name} in it cannot be saved")
         entries = {attribute.name: self.value(getattr(value, attribute.name)) for attribute in fields(value)}
-        # Told of the fit before its errors were widened: it cannot be found again.
+        # The doubts are those of the fit before its errors were widened: they cannot be computed again.
         more = (
             {"doubts": self.value(value.doubts)} if isinstance(value, Fit) and "doubts" in vars(value) else {}
         )

@@ -385,7 +385,7 @@ def test_dates_become_seconds_since_the_first(tmp_path: Path, head: str) -> None
         ("when,angle\n03.05.2024 12:00,x\n", "'03.05.2024 12:00' is no date that is read: write the time in"),
         (
             "time,angle\n12:00:01,1\n",
-            "line 2: '12:00:01' stands where a number for t should be (a time is in",
+            "line 2: '12:00:01' is not a number for t (a time is in",
         ),
         ("when,angle\n2024-05-03,1\nsoon,2\n", "line 3: 'soon' is no date like that of the first row"),
         (

@@ -166,11 +166,11 @@ def table(*, head: str = "t,Y,Z,beta", rows: list[str] = ROWS, **lines: str) -> 
         (table(head="t,a,b,c"), "no column theta: found t, a, b, c"),
         (
             table(r3="0.12,left,0.02,0.3"),
-            "line 5: 'left' stands where a number for Y should be",
+            "line 5: 'left' is not a number for Y",
         ),
         (
             table(r3="0.12,1_0,0.02,0.3"),
-            "line 5: '1_0' stands where a number for Y should be",
+            "line 5: '1_0' is not a number for Y",
         ),
         (table(r3="0.12,0.1,0.02"), "line 5 ends before column beta: 3 of 4 cells"),
         (table(r3=",0.1,0.02,0.3"), "line 5: the time is missing or infinite"),

@@ -60,7 +60,7 @@ def test_rates_of_signals() -> None:
     t = np.linspace(0.0, 3.0, 61)
     smooth = udd.InputSignal(t, np.sin(t), hold="cubic").rate()
     assert np.abs(smooth(t)[5:-5] - np.cos(t)[5:-5]).max() < 1e-5
-    with pytest.raises(MeasurementError, match="an input that is held jumps and has no rate"):
+    with pytest.raises(MeasurementError, match="hold='zero' jumps and has no rate"):
         udd.InputSignal(t, np.sin(t), hold="zero").rate()
 
 

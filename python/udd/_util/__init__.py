@@ -1,1 +1,1 @@
-"""What every package uses and none of them owns: checks, files, progress, threads."""
+"""Helpers of all packages: checks, files, progress, threads."""

@@ -1,4 +1,4 @@
-"""What takes a second to import is imported while the core computes."""
+"""Import slow modules while the core computes."""
 
 from __future__ import annotations
 

@@ -20,10 +20,10 @@ def sf(x: ArrayLike, n: ArrayLike) -> Any:
 
 
 def ppf(p: ArrayLike, n: ArrayLike) -> Any:
-    """What it stays below with probability `p`."""
+    """Return the value that a chi-squared variable stays below with probability `p`."""
     return 2 * special.gammaincinv(np.asarray(n) / 2, p)
 
 
 def isf(p: ArrayLike, n: ArrayLike) -> Any:
-    """What it exceeds with probability `p`."""
+    """Return the value that a chi-squared variable exceeds with probability `p`."""
     return special.chdtri(n, p)

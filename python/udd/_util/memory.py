@@ -15,11 +15,11 @@ def require_memory(what: str, *counts: float, itemsize: int = 8) -> None:
     Parameters
     ----------
     what : str
-        What it holds, in the plural, for the message: ``"10 runs"``.
+        The content in the plural, for the message: ``"10 runs"``.
     *counts : int or float
-        Its shape; a number of times that is not a whole one yet may be infinite.
+        Its shape. A count that is not rounded yet may be infinite.
     itemsize : int
-        Bytes of an element, and of what is made of it meanwhile.
+        Bytes of an element, with those of intermediate results.
 
     Raises
     ------

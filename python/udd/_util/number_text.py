@@ -18,7 +18,7 @@ def number_in(text: str) -> float:
     Raises
     ------
     ValueError
-        It is no number; the sentence names the decimal sign where a comma stands for it.
+        The text is not a number. The message names the decimal point if the text has a decimal comma.
 
     Examples
     --------

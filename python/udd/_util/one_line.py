@@ -45,7 +45,7 @@ def cut(text: str, longest: int) -> str:
 
 
 def link_to(path: Path, text: str) -> str:
-    """Return HTML with a link to a file, for notebooks, which reach files beside them by a relative path."""
+    """Return HTML with a link to a file. Notebooks reach files in their folder by a relative path."""
     try:
         target = quote(path.resolve().relative_to(Path.cwd()).as_posix())
     except (OSError, ValueError):

@@ -24,7 +24,7 @@ _PAUSE = 0.1  # s between two calls of a caller's function
 
 
 def thread_count(threads: int | None) -> int:
-    """The checked number of threads; 0 stands for one per core."""
+    """Check a number of threads and return it; 0 means one per core."""
     if threads is None:
         return 0
     if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
@@ -122,15 +122,15 @@ def progress_bar(
     Parameters
     ----------
     total, initial : float
-        How much work there is, and how much of it is done before.
+        The whole work, and the part that is done before.
     unit : str
-        What is counted, in the singular.
+        Unit of the work, in the singular.
     progress : bool, callable or None
         See `Progress`.
     title : str
-        What is done.
+        Name of the work.
     leave : bool
-        Whether the bar stays when the work is done.
+        If True, the bar stays when the work is done.
     """
     _check(progress)
     if callable(progress):

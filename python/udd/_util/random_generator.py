@@ -8,12 +8,12 @@ import numpy as np
 
 from udd.errors import ModelError
 
-#: What a random generator is made of; None takes fresh entropy.
+#: The seed of a random generator, or a generator; None takes fresh entropy.
 Rng: TypeAlias = int | np.random.Generator | None
 
 
 def generator(rng: Rng) -> np.random.Generator:
-    """The generator of `rng`.
+    """Return the generator of `rng`.
 
     Raises
     ------

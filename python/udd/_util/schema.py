@@ -28,7 +28,7 @@ def is_a(value: object, hint: Any) -> bool:
         return isinstance(value, Mapping) and all(
             is_a(k, inner[0]) and is_a(x, inner[1]) for k, x in value.items()
         )
-    if hint in (float, int):  # a whole number may stand for a float, a truth value for neither
+    if hint in (float, int):  # a whole number is a float, too; a bool is neither
         whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
         return whole or (hint is float and isinstance(value, float))
     return isinstance(value, NoneType if hint is None else hint)

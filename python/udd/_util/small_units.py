@@ -1,4 +1,4 @@
-"""The units in which errors and other small things are told: mm, mrad, ms."""
+"""Units of errors and other small quantities: mm, mrad, ms."""
 
 from __future__ import annotations
 

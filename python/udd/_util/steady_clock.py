@@ -10,12 +10,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-FEWEST = 10  # times: with fewer a constant rate may be chance
-_FINEST = 1e-3  # of a period: rounding to less matters to nobody
-_COARSEST = 0.75  # of a period: coarser times say nothing of the rate
-_GAPS = 0.25  # of a period, up to which the number of missing times is known
-_SLACK = 1e-3  # of the rounding: what the search for the rate is good to
-_EXACT = 1e-6  # of the rounding, within which times are not rounded at all
+FEWEST = 10  # times. With fewer, a constant rate may be chance.
+
+# In periods:
+_FINEST = 1e-3  # Finer rounding does not matter.
+_COARSEST = 0.75  # Coarser times do not determine the rate.
+_GAPS = 0.25  # Up to this error the number of missing times is certain.
+
+# In units of the rounding:
+_SLACK = 1e-3  # accuracy of the search for the rate
+_EXACT = 1e-6  # times with less deviation are not rounded
+
 _DECIMALS = range(7)
 _USUAL = (10, 12, 12.5, 15, 20, 24, 25, 30, 48, 50, 60, 90, 100, 120, 200, 240, 250, 480, 500, 960, 1000)
 #: Rates that cameras and films have, Hz.
@@ -40,14 +45,14 @@ class SteadyClock:
 
     @property
     def text(self) -> str:
-        """What was recognised, in a sentence."""
+        """One sentence on the rate that was recognised."""
         return (
             f"times are rounded to {1e3 * self.rounding:.3g} ms: they are taken as those of "
             f"{1 / self.period:.6g} Hz"
         )
 
     def at(self, t: float, parts: int = 1) -> float:
-        """The time before it was rounded, at whole periods or parts of one; what is off stays as it is."""
+        """Return the time before it was rounded, at whole periods or parts of one; other times stay."""
         return float(self.all_at(np.array([t]), parts)[0])
 
     def all_at(self, t: Array, parts: int = 1) -> Array:

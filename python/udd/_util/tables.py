@@ -82,16 +82,16 @@ def read(
     ----------
     path : Path
     toml : bool
-        Whether it is TOML, not JSON.
+        Read TOML, not JSON.
     error : type
         Kind of `UddError` to raise.
     limit : float
-        Bytes of memory that it may take: a hundred, and a thousand in TOML, for each byte of the file.
+        Bytes of memory that it may take. A byte of JSON counts as 100, a byte of TOML as 1000.
 
     Raises
     ------
     UddError
-        As by :func:`parsed`; it cannot be read, is no regular file, or takes more than `limit`.
+        The errors of :func:`parsed`; the file cannot be read, is not regular, or takes more than `limit`.
     """
     name = str(path) if len(str(path)) < 200 else f"{str(path)[:100]}..."
     memory = MemoryLimit(limit, error)

@@ -180,7 +180,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     known = {"W": args.W, "R": args.R}
     if not is_film(args.file):
         from udd.measurement import read_measurement
-        from udd.measurement.read import columns_of, told
+        from udd.measurement.read import column_sentence, columns_of
 
         states, inputs = None, args.inputs
         limit = {} if args.limit is None else {"limit": args.limit}
@@ -212,7 +212,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 **limit,
                 **known,
             )
-        if said := told(measurement.meta.get("columns")):
+        if said := column_sentence(measurement.meta.get("columns")):
             print(f"udd: {args.file}: {said}", file=sys.stderr)
         return measurement, None
     if args.pendulum is not None:

@@ -1,4 +1,4 @@
-"""What was measured: a table of times and coordinates, and the files it lives in."""
+"""Measurements: tables of times and coordinates, and their files."""
 
 from __future__ import annotations
 

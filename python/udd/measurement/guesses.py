@@ -9,9 +9,9 @@ import numpy as np
 from .formats import Table
 from .formats.headings import UNITS, Heading
 
-#: What a column of a disk or a pendulum may be.
+#: Quantities of a disk's or a pendulum's column.
 ROLES = ("t", "theta", "Omega", "Y", "Z", "beta")
-#: Words of headings; the first role with a word in a heading has it, so longer words stand first.
+#: Words of headings; the first role with a word in a heading has it, so longer words come first.
 _WORDS: dict[str, tuple[str, ...]] = {
     "t": ("time", "zeit", "tijd", "sekunden", "seconds", "seconden"),
     "Omega": ("angular velocity", "angular speed", "winkelgeschwindigkeit", "hoeksnelheid", "gyro", "omega"),

@@ -38,12 +38,12 @@ def read_gyroscope(
     path : path
         A table, or phyphox's zip of tables.
     column : str, optional
-        The gyroscope's axis; by default, of all columns whose headings state rad/s, deg/s or another rate of
-        turning, the one that varies most and takes both signs: a magnitude does not.
+        The gyroscope's axis. By default the column that varies most and has both signs, among those whose
+        headings state rad/s, deg/s or another rate of turning. A magnitude has one sign.
     limit : float
-        As of :func:`udd.read_measurement`.
+        See :func:`udd.read_measurement`.
     **options
-        Other options of it.
+        Other options of that function.
 
     Returns
     -------

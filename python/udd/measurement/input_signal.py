@@ -30,8 +30,8 @@ class InputSignal(Drawable):
     values : array_like, shape (n,)
         The samples, in units of the user's.
     hold : {"linear", "zero", "cubic"}, default "linear"
-        Between samples: straight lines; the last sample held (zero-order hold, as a controller that was
-        sampled puts it out); or the natural cubic spline.
+        Between samples: straight lines; the last sample (zero-order hold, the output of a digital
+        controller); or the natural cubic spline.
 
     Raises
     ------
@@ -80,16 +80,16 @@ class InputSignal(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def shifted(self, by: float) -> InputSignal:
-        """The same signal later by so much [s]."""
+        """Return the same signal, delayed by `by` [s]."""
         return InputSignal(self.t + by, self.values, self.hold)
 
     def rate(self) -> InputSignal:
-        """Its derivative [per s]: of straight lines held steps, of a cubic spline one through its slopes.
+        """Compute its derivative [per s]: steps for straight lines, a spline for a cubic spline.
 
         Raises
         ------
         MeasurementError
-            A held input, which jumps.
+            A zero-order hold, which jumps.
 
         Examples
         --------
@@ -98,14 +98,16 @@ class InputSignal(Drawable):
         array([3., 0.])
         """
         if self.hold == "zero":
-            raise MeasurementError("an input that is held jumps and has no rate: join its samples first")
+            raise MeasurementError(
+                "an input with hold='zero' jumps and has no rate; expected hold='linear' or 'cubic'"
+            )
         slopes = self.pieces[:, 1]
         last = np.diff(self.t[-2:])[0] ** np.arange(4)
         end = float(np.arange(1, 4) * self.pieces[-1, 1:] @ last[:3])
         return InputSignal(self.t, np.append(slopes, end), "zero" if self.hold == "linear" else "cubic")
 
     def lacks(self, start: float, end: float, slack: float, whose: str) -> str:
-        """What it lacks of a span of time, but for so much at its ends, in words; empty where nothing."""
+        """Say that it does not cover a span of time, up to `slack` at both ends; empty if it does."""
         first, last = self.span
         if first - slack <= start and end <= last + slack:
             return ""
@@ -155,7 +157,7 @@ class InputSignal(Drawable):
 
 
 def named_signal(name: str, t: ArrayLike, values: ArrayLike, hold: Any = "linear") -> InputSignal:
-    """A signal from its samples; what is wrong with them is told with its name.
+    """Make a signal from its samples; an error names the signal.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Reading a measurement: from a file of any known kind, with a word on what each column was taken for."""
+"""Reading a measurement from a file of any known kind, with a remark on the use of each column."""
 
 from __future__ import annotations
 
@@ -46,58 +46,60 @@ def read_measurement(
     Parameters
     ----------
     path : path
-        A text table (commas, semicolons, tabs or blanks; decimal commas; found by looking), Parquet, NumPy's
-        ``.npz`` and ``.npy``, MATLAB's ``.mat``, HDF5 (with MATLAB 7.3, needs h5py), a ``.zip`` of tables as
-        phyphox exports it, a Tracker project (``.trk``, ``.trz``) or Tracker's table of several points.
-        Columns ``t, Y, Z, beta`` for a disk or ``t, theta`` for a pendulum [s, m, rad]; a pendulum bob's
-        ``t, x, y`` [m, pivot at the origin, y up] becomes theta = atan2(x, -y). Optional:
-        ``sigma_*``, ``rho_*``, ``flag``. Lines ``# key = value`` become `meta`. Other columns, and
-        lines above the header, are passed over. A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or
-        ``Y [mm]``, is converted to s, m or rad, and dates (ISO 8601) to seconds since the first; a warning
-        tells so. An empty cell or NaN is a frame where
-        it was not seen. Times of a constant rate that the file rounds, as to ms, are those of the rate
-        (``meta["clock"]``); times that vary by more than that stay as they are.
+        A text table (commas, semicolons, tabs or blanks, and decimal commas, are recognised). Parquet,
+        NumPy's ``.npz`` and ``.npy``, MATLAB's ``.mat``, HDF5 (with MATLAB 7.3, needs h5py). A ``.zip`` of
+        tables as phyphox exports it. A Tracker project (``.trk``, ``.trz``) or Tracker's table of several
+        points.
+
+        A disk has the columns ``t, Y, Z, beta``, a pendulum ``t, theta`` [s, m, rad]. A pendulum bob's
+        ``t, x, y`` [m, pivot at the origin, y up] becomes theta = atan2(x, -y). Optional columns are
+        ``sigma_*``, ``rho_*`` and ``flag``. Lines ``# key = value`` become `meta`. Other columns, and lines
+        above the header, are ignored. An empty cell or NaN is a frame without this coordinate.
+
+        A unit in a column's name, as in ``Angle (deg)``, ``t_ms`` or ``Y [mm]``, is converted to s, m or
+        rad, and dates (ISO 8601) to seconds since the first. A warning says so. Times of a constant rate that
+        the file rounds, as to ms, are corrected to that rate (``meta["clock"]``). Other times stay.
     columns : mapping, str or sequence of str, optional
-        Which column is what: ``{"theta": "position"}``, or ``"theta=position"``; units that the columns'
-        names state are converted to s, m, rad and what these make, as rpm to rad/s; a unit of another
-        quantity is refused, and so is one that is not known of a disk's or a pendulum's column. Two columns,
-        ``{"theta": ("mass A x", "mass A y")}``, are a bob's position. The time needs no word where it is
-        called so. Or, for a file without a (usable) header, the columns' names in order: ``"t,theta,_"``.
-        An underscore is a column to pass over.
+        Which column is which coordinate: ``{"theta": "position"}``, or ``"theta=position"``. Two columns,
+        ``{"theta": ("mass A x", "mass A y")}``, are a bob's position. A column of the time that is called so
+        needs no entry. Units in the columns' names are converted to s, m, rad and their products, as rpm to
+        rad/s. A unit of another quantity is refused, and so is an unknown unit of a disk or a pendulum.
+        For a file without a (usable) header, give the columns' names in order: ``"t,theta,_"``. An underscore
+        is a column to ignore.
     states : sequence of str, optional
-        The columns that are wanted, where they are states of a user's own :class:`udd.Model`. Times, angles
-        and their rates are converted to s and rad; others stay in the unit that the model counts in, which a
-        warning tells where the heading states another than m, and `columns` converts them.
+        The columns to read, if they are states of a user's own :class:`udd.Model`. Times, angles and their
+        rates are converted to s and rad. Other columns stay in the model's unit; a warning says so if the
+        heading states another unit than m, and `columns` converts them.
     inputs : sequence of str or mapping, optional
-        Columns with what drove the machine: ``["torque"]``, or ``{"u": "Motor torque (N m)"}``. They keep
-        their unit, which stands in ``meta["input_units"]``. One from another table of the file, or of another
-        length, comes with its own clock; samples that are empty are left out.
+        Columns with the inputs of the machine: ``["torque"]``, or ``{"u": "Motor torque (N m)"}``. They keep
+        their unit, which is in ``meta["input_units"]``. An input from another table of the file, or of
+        another length, keeps its own clock. Empty samples are left out.
     hold : {"linear", "zero", "cubic"}, default "linear"
-        How these inputs run between their samples.
+        Interpolation of these inputs between their samples.
     rate : float, optional
         Samples per second [Hz] of a file that has no column of times.
     repeated : {"first"}, optional
-        Of rows with the same time keep the first; otherwise they are refused.
+        Keep the first of several rows with the same time; by default they are refused.
     part : int, optional
-        Where the clock jumps back: which of the stretches between its jumps, from 0.
+        If the clock jumps back: which of the stretches between its jumps, from 0.
     limit : float, default 1e9
-        Bytes of data that the file may unpack to: what it holds, and 8 for each number. More is refused.
+        Bytes of data that the file may unpack to: its content, and 8 for each number. More is refused.
     **meta
-        Entries that win over those of the file, such as ``W=0.039``; None is ignored.
+        Entries that replace those of the file, such as ``W=0.039``; None is ignored.
 
     Returns
     -------
     Measurement
-        The angle of a disk or a pendulum is made continuous if the file keeps it within one turn; of other
-        columns the model says which are angles, and a fit makes these continuous. ``meta["columns"]`` says
-        what each column was taken for, where they are called otherwise in the file.
+        The angle of a disk or a pendulum is made continuous if the file keeps it within one turn. The angles
+        of other models are made continuous by the fit. ``meta["columns"]`` says which column of the file each
+        coordinate is, if they have other names in the file.
 
     Raises
     ------
     MeasurementError
         The file is missing, empty, broken, of an unknown kind, no regular file, larger than `limit`, or
-        refers to other files (HDF5); a column is missing; a cell is not a number; times do not increase; a
-        value is infinite; a sigma is not positive; too few usable rows.
+        refers to other files (HDF5). A column is missing, or a cell is not a number. Times do not increase,
+        a value is infinite, a sigma is not positive, or there are too few usable rows.
 
     Examples
     --------
@@ -128,8 +130,8 @@ def read_measurement(
     for kept in frames.kept:
         warnings.warn(f"{source}: {kept}", stacklevel=2)
     if frames.converted:
-        told = ", ".join(f"{name} from {units}" for name, units in frames.converted.items())
-        warnings.warn(f"{source}: converted {told}, as its columns say", stacklevel=2)
+        changes = ", ".join(f"{name} from {units}" for name, units in frames.converted.items())
+        warnings.warn(f"{source}: converted {changes}, as its columns say", stacklevel=2)
     return m
 
 
@@ -155,8 +157,8 @@ def columns_of(
     return [*(mapping or {}), *(name for name in names if name not in (mapping or {}))]
 
 
-def told(columns: Any) -> str:
-    """What the columns were taken for (``meta["columns"]``), in a sentence; empty if unknown."""
+def column_sentence(columns: Any) -> str:
+    """Say in a sentence which column each coordinate is (``meta["columns"]``); empty if unknown."""
     if not isinstance(columns, Mapping):
         return ""
     taken = [
@@ -246,7 +248,7 @@ def _measurement(
     drivers: dict[str, str],
     hold: Hold,
 ) -> tuple[Measurement, Frames]:
-    """What the columns make, and which they are."""
+    """Make the measurement of the columns, and return it with their frames."""
     names, bob = _names(record, states)
     columns = ("x", "y") if bob else names
     mapped = record.mapping is not None
@@ -258,7 +260,7 @@ def _measurement(
     if bob:
         x, y = frames.column("x"), frames.column("y")
         values = np.arctan2(x, -y)[:, None]
-        frames.taken["theta"] = f"atan2(x, -y) of {frames.taken.pop('x')} and {frames.taken.pop('y')}"
+        frames.sources["theta"] = f"atan2(x, -y) of {frames.sources.pop('x')} and {frames.sources.pop('y')}"
         extra["length"] = float(np.nanmedian(np.hypot(x, y))) if np.isfinite(x + y).any() else float("nan")
     else:
         values = np.column_stack([frames.column(name) for name in names])
@@ -284,7 +286,7 @@ def _measurement(
         stated = {name: unit for name, unit in units.items() if unit}
         meta["input_units"] = stated | (said if isinstance(said, dict) else {})
     if drivers or frames.renamed:
-        meta.setdefault("columns", frames.told())
+        meta.setdefault("columns", frames.column_sources())
     m = _located(
         frames.table, lambda: Measurement(t, values, sigma, rho, flag, meta, names, quality, signals)
     )
@@ -297,7 +299,7 @@ def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, .
     if states is not None:
         return tuple(states), False
     if record.mapping is not None:
-        return record.asked, False
+        return record.coordinates, False
     have = record.names
     if have & set(DISK):
         return DISK, False
@@ -305,7 +307,7 @@ def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, .
 
 
 def _quality(frames: Frames, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """What a tracked film's file says of each frame; in anybody else's the names may mean anything."""
+    """Return the quality of each frame of a tracked film. In other files the names may mean anything."""
     found: dict[str, NDArray[Any]] = {}
     for name in (n for n in (*QUALITY, *CAMERA_COLUMNS) if frames.has(n) and n not in names):
         if name == "method":

@@ -21,17 +21,17 @@ Asked = str | tuple[str, str]
 
 @dataclass(frozen=True)
 class Units:
-    """How the units that headings state are taken.
+    """How the units in headings are used.
 
     Attributes
     ----------
     known : frozenset of str
-        The columns of a disk, of a pendulum or of a bob: a unit that is not known, or of another quantity, is
+        The columns of a disk, of a pendulum or of a bob: an unknown unit, or a unit of another quantity, is
         refused. In a user's own model the same names may mean anything.
     mapped : bool
-        Whether the user said which column is what.
+        True if the user gave the coordinates of the columns.
     own : bool
-        Whether the columns are states of a user's own model, and nothing else was said of them.
+        True if the columns are states of a user's own model, without a mapping.
     """
 
     known: frozenset[str] = frozenset()
@@ -41,10 +41,10 @@ class Units:
 
 @dataclass(frozen=True)
 class Conversion:
-    """What one of a column's unit is in the base unit, and a word on a change or on what stays."""
+    """The factor from a column's unit to the base unit, and a remark on a change or on a unit that stays."""
 
     size: float = 1.0
-    told: str = ""
+    remark: str = ""
     kept: str = ""
 
 
@@ -68,8 +68,8 @@ class Recorded:
             raise MeasurementError(f"part must be a whole number from 0, not {self.part!r}")
 
     @property
-    def asked(self) -> tuple[str, ...]:
-        """What the mapping names: coordinates, without the time and what is said beside them."""
+    def coordinates(self) -> tuple[str, ...]:
+        """The coordinates in the mapping, without the time, errors and flags."""
         beside = ("sigma_", "rho_")
         return tuple(n for n in self.mapping or {} if n not in ("t", "flag") and not n.startswith(beside))
 
@@ -79,14 +79,14 @@ class Recorded:
         return {heading.name for table in self.tables for heading in table.headings}
 
     def find(self, table: Table, name: str) -> Asked | None:
-        """What the user calls the column for `name`, where the table has it."""
+        """Return the user's name of the column for `name`, if the table has it."""
         asked = (self.mapping or {}).get(name, name)
         parts = [asked] if isinstance(asked, str) else asked
         return asked if all(table.find(part) is not None for part in parts) else None
 
     def missing(self, asked: str) -> MeasurementError:
         """The sentence about a column that is nowhere."""
-        found = [raw for table in self.tables for raw in table.found]
+        found = [raw for table in self.tables for raw in table.raw_headings]
         listed = ", ".join(found[:40]) + (f" and {len(found) - 40} more" if len(found) > 40 else "")
         return MeasurementError(f"no column {asked}: found {listed or 'nothing'}")
 
@@ -120,13 +120,13 @@ class Recorded:
 
 @dataclass
 class Frames:
-    """One table's columns by what they are; what was taken for what is kept beside."""
+    """One table's columns by coordinate, with a record of their names in the file."""
 
     record: Recorded
     whole: Table  # with all its rows
     run: Run
     units: Units
-    taken: dict[str, str] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
     converted: dict[str, str] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
     used: set[str] = field(default_factory=set)
@@ -139,7 +139,7 @@ class Frames:
     @property
     def renamed(self) -> bool:
         """Whether anything is called otherwise in the file."""
-        return any(name != text for name, text in self.taken.items())
+        return any(name != text for name, text in self.sources.items())
 
     def has(self, name: str) -> bool:
         """Whether there is a column for it."""
@@ -152,7 +152,7 @@ class Frames:
         return self.run.t
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """The column for `name`, in s, m, rad and what these make, where its heading states another unit."""
+        """Return the column for `name`, converted to s, m, rad and their products."""
         asked = self.record.find(self.table, name)
         if asked is None:
             raise self.record.missing(_text((self.record.mapping or {}).get(name, name)))
@@ -163,18 +163,18 @@ class Frames:
         heading = self.table.headings[k]
         conversion = _conversion(name, heading, self.units)
         self._note(name, heading, conversion)
-        one = conversion.size
-        return self.table.numbers(k) if one == 1.0 else self.table.numbers(k) * one
+        factor = conversion.size
+        return self.table.numbers(k) if factor == 1.0 else self.table.numbers(k) * factor
 
     def _bob(self, name: str, asked: tuple[str, str]) -> NDArray[np.float64]:
-        """The angle from hanging of a point whose pivot is the origin."""
+        """Return the angle from hanging of a point whose pivot is the origin."""
         places = [k for k in map(self.table.find, asked) if k is not None]
         x, y = (self.table.numbers(k) for k in places)
         units = {self.table.headings[k].unit for k in places}
         if len(units) > 1:
             raise MeasurementError(f"the columns {' and '.join(asked)} are in different units")
         self.used |= {self.table.headings[k].raw for k in places}
-        self.taken[name] = f"atan2(x, -y) of {' and '.join(asked)}"
+        self.sources[name] = f"atan2(x, -y) of {' and '.join(asked)}"
         return np.arctan2(x, -y)
 
     def words(self, name: str) -> NDArray[np.str_]:
@@ -188,16 +188,16 @@ class Frames:
 
     def _note(self, name: str, heading: Heading, conversion: Conversion) -> None:
         self.used.add(heading.raw)
-        self.taken[name] = heading.raw + (f", {conversion.told}" if conversion.told else "")
+        self.sources[name] = heading.raw + (f", {conversion.remark}" if conversion.remark else "")
         if name.startswith("sigma_"):
             return
-        if conversion.told:
-            self.converted[name] = conversion.told
+        if conversion.remark:
+            self.converted[name] = conversion.remark
         if conversion.kept:
             self.kept.append(conversion.kept)
 
     def input(self, name: str, asked: str, hold: Hold) -> tuple[InputSignal, str]:
-        """A measured input, with the clock of the table where it lies, and the unit that it states."""
+        """Return a measured input with the clock of its table, and its unit."""
         tables = [self.whole, *(table for table in self.record.tables if table is not self.whole)]
         for table in tables:
             k = table.find(asked)
@@ -208,16 +208,16 @@ class Frames:
             there = ~np.isnan(values)
             heading = table.headings[k]
             self.used |= {heading.raw, run.heading.raw}
-            self.taken[name] = f"{heading.raw}, input"
+            self.sources[name] = f"{heading.raw}, input"
             if not there.all():
-                self.taken[name] += f", {int((~there).sum())} samples empty"
+                self.sources[name] += f", {int((~there).sum())} samples empty"
             return named_signal(name, run.t[there], values[there], hold), heading.unit
         raise self.record.missing(asked)
 
-    def told(self) -> dict[str, str]:
-        """What each column was taken for, and which were passed over."""
-        rest = [raw for table in self.record.tables for raw in table.found if raw not in self.used]
-        return self.taken | ({"passed over": ", ".join(dict.fromkeys(rest))} if rest else {})
+    def column_sources(self) -> dict[str, str]:
+        """Return the column of each coordinate, and the columns that were ignored."""
+        rest = [raw for table in self.record.tables for raw in table.raw_headings if raw not in self.used]
+        return self.sources | ({"passed over": ", ".join(dict.fromkeys(rest))} if rest else {})
 
 
 @dataclass(frozen=True)
@@ -247,9 +247,9 @@ def _run(record: Recorded, table: Table, units: Units) -> Run:
             raise MeasurementError(f"rate is for files without times, but here is {table.headings[k].raw}")
         heading = table.headings[k]
         conversion = _conversion("t", heading, units)
-        one = conversion.size
+        factor = conversion.size
         table = _timed(table, k)
-        t = table.numbers(k) if one == 1.0 else table.numbers(k) * one
+        t = table.numbers(k) if factor == 1.0 else table.numbers(k) * factor
     if not len(t):
         raise MeasurementError("the file holds no rows")
     pick = _rows(record, t)
@@ -318,7 +318,7 @@ def own_inputs(table: Table) -> dict[str, InputSignal]:
 
 
 def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
-    """What becomes of a column in the unit that its heading states.
+    """Return the conversion of a column from the unit in its heading.
 
     Raises
     ------
@@ -326,30 +326,30 @@ def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
         It is not known, or of another quantity than the column is.
     """
     if heading.dates:
-        return Conversion(told="dates to s since the first")
+        return Conversion(remark="dates to s since the first")
     plain = name.removeprefix("sigma_")
     unit = heading.unit or (ending(plain, heading) if units.mapped else "")
     if not unit:
         return Conversion()
-    base, known = COUNTED.get(plain), in_base_units(unit)
-    one = size(name, unit)
-    if base is not None and one is None:
-        if known is not None and (base != "m" or plain in units.known or units.mapped):
+    base, base_unit = COUNTED.get(plain), in_base_units(unit)
+    factor = size(name, unit)
+    if base is not None and factor is None:
+        if base_unit is not None and (base != "m" or plain in units.known or units.mapped):
             raise MeasurementError(f"{name} is counted in {base}, but the column is called {heading.raw}")
-        if known is None and plain in units.known:
+        if base_unit is None and plain in units.known:
             raise MeasurementError(f"the unit {unit[:80]!r} of {name} is not known; write {USUAL[base]}")
-        if known is None and base != "m":
+        if base_unit is None and base != "m":
             return Conversion(kept=f"the unit {unit[:80]!r} of {name} is not known, its numbers stay")
-    elif base is not None and one is not None:
-        known = (one, base)
-    if known is None or known[0] == 1.0:
+    elif base is not None and factor is not None:
+        base_unit = (factor, base)
+    if base_unit is None or base_unit[0] == 1.0:
         return Conversion()
-    if units.own and known[1].startswith("m"):
+    if units.own and base_unit[1].startswith("m"):
         # A model may count in mm; what it takes the sine of is in rad.
-        return Conversion(kept=f'{name} stays in {unit} (columns="{name}={name}" makes it {known[1]})')
+        return Conversion(kept=f'{name} stays in {unit} (columns="{name}={name}" makes it {base_unit[1]})')
     if base is None and not units.mapped and not units.own:
         return Conversion()
-    return Conversion(known[0], f"{unit} to {known[1]}")
+    return Conversion(base_unit[0], f"{unit} to {base_unit[1]}")
 
 
 def _text(asked: Asked) -> str:

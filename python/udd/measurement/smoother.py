@@ -16,11 +16,21 @@ from . import DISK, Measurement, MeasurementError, check_length
 from .unwrapping import unwrapped
 
 Array = NDArray[np.float64]
-LEARN = 2000  # rows from which the roughness of the motion is learnt
-TRIED = np.logspace(-12, 1, 53)  # roughnesses, as shares of what the third differences would say at most
-THIRD = 11 / 20  # variance of the third difference of white jerk of density 1 per frame: a B-spline's square
-WIDE = 100.0  # the first state's variance over that of a frame's step: nothing is known of it
-ROUNDS = 3  # times that the rolling constraint is made linear about the last answer
+
+# Rows from which the roughness of the motion is estimated.
+LEARN = 2000
+
+# Trial values of the roughness, as shares of its largest value by the third differences.
+TRIED = np.logspace(-12, 1, 53)
+
+# Variance of the third difference of white jerk of density 1 per frame: a B-spline's square.
+THIRD = 11 / 20
+
+# Variance of the unknown first state over that of a frame's step.
+WIDE = 100.0
+
+# Linearisations of the rolling constraint about the last estimate.
+ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -44,11 +54,11 @@ def smooth(
     measurement : Measurement
         With standard errors; of a disk, a pendulum or any other coordinates.
     gap : float
-        Longest time between two usable rows that is bridged [s]. In a longer one nothing is filled in, and
-        nothing passes from one side to the other.
+        Longest time between two usable rows that is bridged [s]. A longer gap is not filled in, and its two
+        sides are smoothed separately.
     slip : float, optional
-        If given, the disk is taken to roll, dY/dT = Z Omega, up to a random slip of this standard error
-        [m/s] in each row (and the error of the contact, ``meta["pivot_sigma"]``, times Omega).
+        If given, the disk rolls, dY/dT = Z Omega, up to a random slip of this standard error [m/s] in each
+        row. The error of the contact, ``meta["pivot_sigma"]``, times Omega is added.
     angles : collection of str
         Columns of a model of your own that are angles: they are made continuous first, as those of a disk and
         a pendulum are in any case.
@@ -70,10 +80,10 @@ def smooth(
 
     Notes
     -----
-    Every coordinate has a position, a rate and an acceleration that white jerk drives; the strength of the
-    jerk is that which makes the record likeliest (Kalman filter, Rauch, Tung and Striebel, AIAA J. 3, 1965).
-    Errors of neighbouring rows go together afterwards: fit and discover with the record as it was measured,
-    and never test for slip what was smoothed with `slip`.
+    Every coordinate has a position, a rate and an acceleration that white jerk drives. The strength of the
+    jerk has the highest likelihood (Kalman filter, Rauch, Tung and Striebel, AIAA J. 3, 1965). The errors of
+    neighbouring rows are correlated afterwards: fit and discover with the original record, and never test a
+    record for slip that was smoothed with `slip`.
 
     Examples
     --------
@@ -145,7 +155,7 @@ def _stretches(m: Measurement, gap: float, frame: float) -> list[_Stretch]:
 
 
 def _learn(stretches: list[_Stretch]) -> tuple[Array, Array]:
-    """Density of the jerk and mean square of a step, for each coordinate: the likeliest of `TRIED`."""
+    """Estimate the density of the jerk and the mean square of a step of each coordinate, from `TRIED`."""
     some, count = [], 0
     for stretch in sorted(stretches, key=lambda s: len(s.t), reverse=True):
         some.append(stretch)

@@ -26,7 +26,7 @@ PENDULUM = ("theta",)
 #: Motion of a film's camera: the place of the steady picture's corner in a frame [pixels], the frame's turn
 #: [rad] and enlargement, and its light relative to the steady picture.
 CAMERA_COLUMNS = ("camera_u", "camera_v", "camera_turn", "camera_zoom", "camera_gain")
-#: What a tracked film says of each frame.
+#: Columns of a tracked film on the quality of each frame.
 QUALITY = ("marks", "complete", "residual_px", "blur_px", "method")
 USABLE = ("gap", "degraded")  # flags of frames that hold what they show all the same
 SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any model here
@@ -42,8 +42,8 @@ class Measurement(Drawable):
         Times [s], strictly increasing.
     values : array_like, shape (n, m), or mapping of name to shape (n,)
         One column per name. A disk has ``Y, Z`` [m] and ``beta`` [rad, unwrapped]; a pendulum has
-        ``theta`` [rad, 0 hanging]; others are states of a user's own :class:`udd.Model`. NaN where a frame
-        did not show it.
+        ``theta`` [rad, 0 hanging]; others are states of a user's own :class:`udd.Model`. NaN marks a frame
+        without this coordinate.
     sigma : array_like or mapping, optional
         Standard errors in the layout and units of `values`.
     rho : array_like, shape (n, m (m - 1) / 2), optional
@@ -52,20 +52,20 @@ class Measurement(Drawable):
         Why a frame is not usable; the empty string is a good frame. One that begins with ``gap`` (frames are
         missing before this one) or ``degraded`` is a remark: the row counts, with its standard errors.
     meta : mapping, optional
-        What else is known: ``R`` [m], ``W`` [m/s], ``source``, ``fps``, ``middle`` (Y and Z [m] of the
-        picture's middle, about which a lens bends it), ...
+        Other data: ``R`` [m], ``W`` [m/s], ``source``, ``fps``, ``middle`` (Y and Z [m] of the picture's
+        middle, the centre of the lens's distortion), ...
     names : tuple of str, optional
-        Column names; found from the number of columns if not given.
+        Column names; by default those of a record with this number of columns.
     quality : mapping, optional
-        What is known of how each row came about, by name (n,): of a tracked film ``marks`` (number seen),
-        ``complete`` (share of the marks' edges in view), ``residual_px`` (r.m.s. misfit of the marks),
-        ``blur_px`` (length of the streaks) and ``method`` ("refined", "fast" or "none"); of a camera that
-        moved also ``camera_u, camera_v`` [pixels], ``camera_turn`` [rad], ``camera_zoom``, ``camera_gain``.
+        Quality of each row by name, shape (n,). A tracked film has ``marks`` (number in view), ``complete``
+        (share of the marks' edges in view), ``residual_px`` (r.m.s. misfit of the marks), ``blur_px``
+        (length of the streaks) and ``method`` ("refined", "fast" or "none"). A moving camera also has
+        ``camera_u, camera_v`` [pixels], ``camera_turn`` [rad], ``camera_zoom`` and ``camera_gain``.
     inputs : mapping, optional
         Measured inputs (what drives it) by name: an :class:`udd.InputSignal` with a clock of its own, or an
-        array (n,) of samples at `t`, joined by straight lines. Their units may stand in
-        ``meta["input_units"]``, as text by name. Picking rows keeps the signals whole: a model needs its
-        input between the rows.
+        array (n,) of samples at `t`, joined by straight lines. ``meta["input_units"]`` may hold their units,
+        as text by name. A selection of rows keeps the whole signals: a model needs its input between the
+        rows.
 
     Raises
     ------
@@ -172,8 +172,8 @@ class Measurement(Drawable):
     def seen(self) -> NDArray[np.bool_]:
         """Usable rows, shape (n,): what was measured is there and the flag is empty or a mere remark.
 
-        Of a disk and a pendulum every coordinate must be there; of a user's own model any will do, since
-        sensors may have rates of their own.
+        A disk or a pendulum needs every coordinate; a user's own model needs any, since sensors may have
+        rates of their own.
         """
         there = np.isfinite(self.values)
         return np.asarray(
@@ -348,8 +348,8 @@ def _columns(
         columns = [_numbers(name, values[name]) for name in names]
         shapes = [column.shape for column in columns]
         if any(len(shape) != 1 for shape in shapes) or len(set(shapes)) > 1:
-            told = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
-            raise MeasurementError(f"{what} must be columns of one length, not of shapes {told}")
+            sizes = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
+            raise MeasurementError(f"{what} must be columns of one length, not of shapes {sizes}")
         return np.column_stack(columns) if columns else np.empty((0, 0))
     table = _numbers(what, values)
     if table.ndim not in (1, 2):

@@ -22,8 +22,8 @@ from .table import Measurement
 def to_csv(m: Measurement, path: str | os.PathLike[str]) -> None:
     """Write `m` as CSV: ``# key = value`` lines, a header, one row per frame.
 
-    An input is a column ``input:NAME``; one with its own clock has it in ``t:NAME`` beside it, and may go on
-    below the last frame.
+    An input is a column ``input:NAME``. An input with its own clock has a column ``t:NAME``, too, and may
+    continue below the last frame.
     """
     table = numbers(m)
     words = {name: column.tolist() for name, column in m.quality.items() if column.dtype.kind not in "iuf"}
@@ -84,7 +84,7 @@ def inputs(m: Measurement) -> dict[str, NDArray[np.float64]]:
 
 
 def header(m: Measurement) -> dict[str, Any]:
-    """What stands above the table: `meta`, and how each input runs between its samples."""
+    """Return the entries above the table: `meta`, and the interpolation of each input."""
     holds = {"input_hold": {name: signal.hold for name, signal in m.inputs.items()}} if m.inputs else {}
     return {**m.meta, **holds}
 

@@ -21,7 +21,7 @@ HEAD = 4096
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file: how it is told from others by its first bytes or its suffix, and what reads it."""
+    """A kind of file: how its first bytes or its suffix identify it, and its reader."""
 
     name: str
     is_so: Callable[[bytes, str], bool]

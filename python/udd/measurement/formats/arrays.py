@@ -28,7 +28,7 @@ def tables_of(
     """One table for each length of columns.
 
     A matrix gives a column ``name_1``, ``name_2`` ... for each of the quantities along its shorter side; a
-    single number and a text are about the whole file. Of a name like ``run/theta`` the last part suffices.
+    single number and a text are about the whole file. The last part of a name like ``run/theta`` suffices.
 
     Raises
     ------
@@ -88,4 +88,5 @@ def _named(tables: list[Table], given: list[str]) -> Table:
     for table in tables:
         if len(table.columns) == len(given):
             return replace(table, headings=[Heading(name, name) for name in given])
-    raise MeasurementError(f"columns gives {len(given)} names, but the file has {', '.join(tables[0].found)}")
+    headings = ", ".join(tables[0].raw_headings)
+    raise MeasurementError(f"columns gives {len(given)} names, but the file has {headings}")

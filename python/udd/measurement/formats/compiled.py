@@ -16,7 +16,7 @@ from udd._util.child_process import ChildProcess
 from udd._util.input_files import MemoryLimit
 from udd.errors import MeasurementError
 
-from .numpy_arrays import told
+from .numpy_arrays import one_line_message
 
 READER = str(Path(__file__).with_name("compiled_process.py"))
 PATIENCE = 300.0  # s
@@ -66,7 +66,7 @@ def read(kind: str, what: str, raw: bytes, memory: MemoryLimit) -> Content:
         child.to.close()
         for said in _columns(child, memory, content):
             if "error" in said:
-                raise MeasurementError(f"{what} cannot be read: {told(said['error'])}")
+                raise MeasurementError(f"{what} cannot be read: {one_line_message(said['error'])}")
             if "exceeded" in said:
                 raise memory.exceeded()
             content.meta = said["meta"]

@@ -7,10 +7,11 @@ libraries may crash, follow links to other files, or unfold a small file without
 file: the content comes through a pipe, and after the imports no descriptor is left. Memory and CPU time are
 limited, too.
 
-The answer is a sequence of columns: a line of JSON with ``name``, ``unit`` and ``shape`` and then the numbers
-(float64), or with ``words``, a number of bytes, and then a JSON list of texts. A table that comes in pieces
-begins with a line of ``names``; the `name` of a piece is then the number of its column. The last line holds
-``meta``, or ``error``, or ``exceeded``. Run as a script, this imports nothing of the package.
+The answer is a sequence of columns. A column of numbers is a line of JSON with ``name``, ``unit`` and
+``shape``, and then the numbers (float64). A column of texts is a line with ``words``, a number of bytes, and
+then a JSON list. A table in pieces begins with a line of ``names``; the `name` of a piece is then the number
+of its column. The last line holds ``meta``, or ``error``, or ``exceeded``. Run as a script, this imports
+nothing of the package.
 """
 
 from __future__ import annotations

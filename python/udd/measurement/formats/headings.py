@@ -1,4 +1,4 @@
-"""What the heading of a column says: a name, and a unit."""
+"""Name and unit in the heading of a column."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ UNITS: dict[str, dict[str, float]] = {
 }
 #: In what a disk's and a pendulum's columns are counted.
 COUNTED: dict[str, str] = {"t": "s", "Y": "m", "Z": "m", "x": "m", "y": "m", "beta": "rad", "theta": "rad"}
-#: Units to write for what is counted in one, where a unit is not known.
+#: Units to suggest for a quantity if a unit is not known.
 USUAL: dict[str, str] = {"s": "s or ms", "m": "m, cm or mm", "rad": "deg or rad"}
-#: What may stand before a unit without brackets: ``t_ms``, ``t / s``, ``angle deg``, ``angle in deg``.
+#: Separators before a unit without brackets: ``t_ms``, ``t / s``, ``angle deg``, ``angle in deg``.
 _BEFORE_UNIT = re.compile(r"(?:\s*[_/,]\s*|\s+in\s+|\s+)(?=[^_/,\s]+$)")
 # None of these matches an opening bracket within another, so that a row of brackets is read once.
 _IN_BRACKETS = re.compile(r"_?\{[^{}]*\}|\[[^][]*\]|\([^()]*\)")
 _UNIT = re.compile(r"[\[(]([^][()]+)[])]")
-#: What looks like a unit that is not known, such as V or mV/K.
+#: Texts that look like an unknown unit, such as V or mV/K.
 _SYMBOL = r"[\[(]?[^\W\d]{1,3}(?:[/*·][^\W\d]{1,3})?[\])]?"
 #: Names that a unit may follow without brackets; others may be states of a user's own model.
 _ENDING = ("t", "Y", "Z", "beta", "theta")
@@ -95,7 +95,7 @@ def headings(cells: Sequence[str]) -> list[Heading]:
 
 
 def stated_unit(cell: str) -> str:
-    """The known unit that a cell consists of, or that stands in it in brackets; empty if there is none."""
+    """Return the known unit of a cell, alone or in brackets; empty if not available."""
     texts = [cell.strip(), *(part.strip() for part in _UNIT.findall(cell))]
     return next((text for text in texts if in_base_units(text)), "")
 
@@ -106,7 +106,7 @@ def is_unit(cell: str) -> bool:
 
 
 def joined(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Names with the units that stand in a row below them; what is no unit there is passed over."""
+    """Join names and the units in a row below them. Cells that are no units are ignored."""
     below = [*units, *[""] * len(names)]
     result = []
     for name, cell in zip(names, below, strict=False):
@@ -122,7 +122,7 @@ def _parted(name: str) -> tuple[str, str]:
 
 
 def ending(name: str, heading: Heading) -> str:
-    """The unit without brackets, as in ``Winkel deg``, of a column that was said to be a time or an angle."""
+    """Return the unit without brackets, as in ``Winkel deg``, of a column of times or angles."""
     unit = _parted(heading.raw)[1]
     return unit if COUNTED.get(name) in ("s", "rad") and size(name, unit) else ""
 
@@ -132,12 +132,12 @@ def _symbol(name: str) -> str:
 
 
 def size(name: str, unit: str) -> float | None:
-    """What one of a unit is in the unit that a column is counted in; None where it is no unit of that."""
+    """Return the factor from a unit to the unit of a column; None for a unit of another quantity."""
     return _size(COUNTED.get(name.removeprefix("sigma_"), ""), unit)
 
 
 def in_base_units(unit: str) -> tuple[float, str] | None:
-    """What one of any known unit is, and in what; None of an unknown one."""
+    """Return the factor of a known unit and its base unit; None for an unknown unit."""
     return next(((one, base) for base in UNITS if (one := _size(base, unit)) is not None), None)
 
 

@@ -17,7 +17,7 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
     except MeasurementError:
         raise
     except Exception as error:  # of what a broken file makes NumPy raise there is no list
-        raise MeasurementError(f"the NumPy archive cannot be read: {told(error)}") from None
+        raise MeasurementError(f"the NumPy archive cannot be read: {one_line_message(error)}") from None
     return tables_of(arrays, given, memory=memory)
 
 
@@ -26,11 +26,11 @@ def read_one(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[T
     try:
         array = array_of(raw)
     except Exception as error:
-        raise MeasurementError(f"the NumPy array cannot be read: {told(error)}") from None
+        raise MeasurementError(f"the NumPy array cannot be read: {one_line_message(error)}") from None
     return tables_of({"column": array}, given, memory=memory)
 
 
-def told(error: Exception | str) -> str:
-    """What a library says, on one line and no longer than that."""
+def one_line_message(error: Exception | str) -> str:
+    """Return the message of a library on one line, at most 160 characters."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else text[:157] + "..."

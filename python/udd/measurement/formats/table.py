@@ -24,9 +24,9 @@ NOTHING = {"", "nan", "na", "n/a", "null", "none"}
 class Table:
     """Columns of one length.
 
-    `columns` are numbers, or cells as text (None if a row ends before them); `lines` the lines of the file
-    that the rows stand in, if it has lines; `name` that of the table, if a file holds several; `cut` says
-    that a last row was passed over.
+    `columns` are numbers, or cells as text (None if a row ends before them). `lines` are the numbers of the
+    rows' lines, if the file has lines; `name` is that of the table, if a file holds several; `cut` says that
+    a last row was ignored.
     """
 
     headings: list[Heading]
@@ -42,8 +42,8 @@ class Table:
         return len(self.columns[0]) if self.columns else 0
 
     @property
-    def found(self) -> list[str]:
-        """The headings of its columns, as they stand in the file."""
+    def raw_headings(self) -> list[str]:
+        """The headings of its columns, as the file has them."""
         return [heading.raw for heading in self.headings if heading.name not in ("", "_")]
 
     def find(self, asked: str) -> int | None:
@@ -95,7 +95,7 @@ class Table:
             except ValueError:
                 help_ = " (a time is in seconds, or a date as 2024-05-03 12:00:00)" if name == "t" else ""
                 raise MeasurementError(
-                    f"{self.place(i)}: {cell[:80]!r} stands where a number for {name} should be{help_}"
+                    f"{self.place(i)}: {cell[:80]!r} is not a number for {name}{help_}"
                 ) from None
         return out
 

@@ -37,7 +37,7 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
     commas beside semicolons, tabs, blanks or in quotes, and empty rows are understood. Dates as ISO 8601 has
     them become seconds since the first. Tracker's export of several points begins
     with ``#multi:`` and a row of their names, and repeats the columns of each: they are called ``mass A x``.
-    Units may stand in a row below the names. A last row that was cut off is passed over.
+    A row below the names may hold units. A last row that was cut off is passed over.
     """
     lines = Lines(raw, memory)
     meta: dict[str, Any] = {}
@@ -67,7 +67,7 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
 
 
 def value(text: str, memory: MemoryLimit) -> Any:
-    """What stands behind the equals sign in a file's head."""
+    """Parse the text behind the equals sign in a file's head."""
     memory.take(NESTED * len(text) if text[:1] in ("[", "{") else len(text))
     try:
         return json.loads(text)
@@ -286,7 +286,7 @@ def _of_points(names: list[str], points: list[str]) -> list[str]:
 
 
 def _without_numbers(lines: Lines, mark: str) -> MeasurementError:
-    """What to say of a table in which no row has two numbers."""
+    """Return the error for a table in which no row has two numbers."""
     date = next((cell for row in _rows(lines, mark) for cell in row if _DATE.match(cell)), None)
     if date is None:
         return MeasurementError("no row holds numbers")

@@ -55,14 +55,14 @@ class TextColumn:
     Attributes
     ----------
     rows : Rows
-        Where its cells are.
+        The cells of the table.
     k : int
-        Which of them.
+        Number of the column.
     values : ndarray or None
         Its numbers, if all cells are numbers or empty.
     length : int
     pick : ndarray or None
-        The rows that are meant, in their order; by default all.
+        The rows to take, in their order; by default all.
     """
 
     rows: Rows

@@ -115,7 +115,7 @@ def _number(owner: ElementTree.Element, name: str, default: float) -> float:
 
 
 def _frames(owner: ElementTree.Element) -> Iterator[tuple[int, ElementTree.Element]]:
-    """What was set at frames, by their numbers."""
+    """Yield the numbers of frames and the elements that are set there."""
     for data in owner.findall("property"):
         if data.get("name") == "framedata":
             for one in data.findall("property"):

@@ -10,7 +10,7 @@ from udd._util.numpy_files import opened_zip
 from udd.errors import MeasurementError
 
 from . import text, tracker_project
-from .numpy_arrays import told
+from .numpy_arrays import one_line_message
 from .table import Table
 
 _TEXT = {".csv", ".txt", ".tsv", ".dat"}
@@ -33,7 +33,7 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
     except MeasurementError:
         raise
     except Exception as error:  # BadZipFile, zlib.error, a password, an unknown method ...
-        raise MeasurementError(f"the archive cannot be read: {told(error)}") from None
+        raise MeasurementError(f"the archive cannot be read: {one_line_message(error)}") from None
     if not contents:
         raise MeasurementError(
             f"the archive holds no table (.csv): found {', '.join(names[:8]) or 'nothing'}"
