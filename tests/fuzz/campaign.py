@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -18,7 +19,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 BATCH = 100  # cases
-LONGEST = 900.0  # seconds of a batch, on a machine that is busy
+WORK = 300  # seconds of a batch's processor time: a loop without end has no more
+LONGEST = (
+    1800.0  # seconds of a batch, on a machine that is busy: a process that waits without end has no more
+)
 MEMORY = 4 << 30  # bytes of a batch's process
 
 WORKER = """
@@ -49,14 +53,19 @@ print(json.dumps([cases, faults]))
 
 def batch(kind: str, seed: int) -> tuple[str, int, int, list[str]]:
     """Run a batch of cases of one kind; return the kind, the seed, the number of cases and the faults."""
-    limit = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({MEMORY}, {MEMORY}))\n"
-    command = [sys.executable, "-c", limit + WORKER, kind, str(seed), str(BATCH)]
+    limits = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({MEMORY}, {MEMORY}))\n"
+        f"resource.setrlimit(resource.RLIMIT_CPU, ({WORK}, {WORK + 5}))\n"
+    )
+    command = [sys.executable, "-c", limits + WORKER, kind, str(seed), str(BATCH)]
     try:
         done = subprocess.run(
             command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=LONGEST, check=False
         )
     except subprocess.TimeoutExpired:
         return kind, seed, 0, [f"hang: no end within {LONGEST:g} s"]
+    if -done.returncode == signal.SIGXCPU:
+        return kind, seed, 0, [f"hang: no end within {WORK} s of processor time"]
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         return kind, seed, 0, [f"exit code {done.returncode}: {last}"]

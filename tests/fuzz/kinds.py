@@ -7,7 +7,6 @@ import inspect
 import io
 import itertools
 import linecache
-import os
 import signal
 import tempfile
 import time
@@ -30,9 +29,12 @@ from udd.video.reader import Film
 
 PACKAGE = str(Path(udd.__file__).parent)
 LONGEST_MESSAGE = 500  # characters
-PATIENCE = 2.0  # seconds before Ctrl-C is pressed
 EVALUATIONS = 20_000  # of a law, by SciPy's method
-DEAF = 0.3  # seconds that a run may go on after Ctrl-C; more on a machine that is busy (`UDD_FUZZ_DEAF`)
+
+# Ctrl-C is pressed after so many seconds of processor time, or of waiting.
+PATIENCE, WAIT = 2.0, 60.0
+# A call may go on for so many seconds of processor time after that.
+DEAF = 0.3
 
 
 class Fault(AssertionError):
@@ -56,15 +58,18 @@ def is_clear(error: BaseException) -> bool:
 def watched() -> Iterator[None]:
     """Let a case end in a result or a clear refusal, and press Ctrl-C after `PATIENCE`."""
     is_pressed = False
-    start = time.monotonic()
+    # Processor time: on a busy machine a call waits for its turn.
+    start = time.process_time()
 
     def press(*_: object) -> None:
         nonlocal is_pressed
         is_pressed = True
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGALRM, press)
-    signal.setitimer(signal.ITIMER_REAL, PATIENCE)
+    timers = {signal.SIGPROF: (signal.ITIMER_PROF, PATIENCE), signal.SIGALRM: (signal.ITIMER_REAL, WAIT)}
+    before = {number: signal.signal(number, press) for number in timers}
+    for timer, seconds in timers.values():
+        signal.setitimer(timer, seconds)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -78,11 +83,13 @@ def watched() -> Iterator[None]:
         if len(str(error)) > LONGEST_MESSAGE:
             raise Fault(f"a message of {len(str(error))} characters: {str(error)[:100]}...") from error
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for timer, _ in timers.values():
+            signal.setitimer(timer, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     # From the signal on, which Python itself hears only once a call of the core is over.
-    deaf = time.monotonic() - start - PATIENCE
-    if is_pressed and deaf > float(os.environ.get("UDD_FUZZ_DEAF", DEAF)):
+    deaf = time.process_time() - start - PATIENCE
+    if is_pressed and deaf > DEAF:
         raise Fault(f"deaf to Ctrl-C for {deaf:.1f} s")
 
 
@@ -273,7 +280,7 @@ def optional_arguments(function: Callable[..., Any]) -> list[str]:
 # --- tables and files
 
 
-def bent(sample: bytes, data: DataObject) -> bytes:
+def mutated(sample: bytes, data: DataObject) -> bytes:
     """Return a sample with some of its bytes replaced, removed, repeated or cut off."""
     changed = bytearray(sample)
     for _ in range(data.draw(st.integers(1, 6))):
@@ -315,8 +322,8 @@ def read(content: bytes, name: str) -> None:
 
 
 def csv(data: DataObject) -> None:
-    """Read a table whose text was bent."""
-    read(bent(data.draw(st.sampled_from(TABLES)).encode(), data), "table.csv")
+    """Read a table with a mutated text."""
+    read(mutated(data.draw(st.sampled_from(TABLES)).encode(), data), "table.csv")
 
 
 @cache
@@ -358,9 +365,9 @@ def _to_mat(path: Path, t: Any) -> None:
 
 
 def files(data: DataObject) -> None:
-    """Read a file of a compiled format whose bytes were bent."""
+    """Read a file of a compiled format with mutated bytes."""
     name = data.draw(st.sampled_from(sorted(samples())))
-    content = bent(samples()[name], data)
+    content = mutated(samples()[name], data)
     if name.endswith(".udd"):
         with tempfile.TemporaryDirectory() as folder, watched():
             path = Path(folder) / name
@@ -371,11 +378,11 @@ def files(data: DataObject) -> None:
 
 
 def films(data: DataObject) -> None:
-    """Read the frames of a film whose bytes were bent, through the decoder's process."""
+    """Read the frames of a film with mutated bytes, through the decoder's process."""
     sample = (Path(udd.__file__).parent / "demo" / "sample.mp4").read_bytes()
     with tempfile.TemporaryDirectory() as folder, watched():
         path = Path(folder) / "film.mp4"
-        path.write_bytes(bent(sample, data))
+        path.write_bytes(mutated(sample, data))
         pictures = Film(path).pictures()
         with contextlib.closing(pictures):  # type: ignore[type-var]
             for _ in zip(range(5), pictures, strict=False):
@@ -383,7 +390,7 @@ def films(data: DataObject) -> None:
 
 
 def specifications(data: DataObject) -> None:
-    """Read a sweep's specification whose TOML or JSON text was bent."""
+    """Read a sweep's specification with a mutated TOML or JSON text."""
     toml = (
         'quantity = "lyapunov"\nchunk = 4\n[model]\nkind = "dle"\nw = 1.0\n'
         "[over.w]\nfrom = 0.5\nto = 2.0\nn = 4\n[options]\ntol = 0.02\n"
@@ -395,7 +402,7 @@ def specifications(data: DataObject) -> None:
     name, sample = data.draw(st.sampled_from([("a.toml", toml), ("a.json", json)]))
     with tempfile.TemporaryDirectory() as folder, watched():
         path = Path(folder) / name
-        path.write_bytes(bent(sample.encode(), data))
+        path.write_bytes(mutated(sample.encode(), data))
         udd.SweepSpec.read(path)
 
 
