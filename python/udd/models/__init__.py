@@ -1,4 +1,4 @@
-"""What is integrated: the equations of the paper, of a pendulum, and of the user."""
+"""Models: the equations of the paper, of a pendulum, and of the user."""
 
 from __future__ import annotations
 

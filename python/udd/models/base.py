@@ -1,4 +1,4 @@
-"""What is integrated: the equations of the paper, of a pendulum, and of the user."""
+"""The base class of models: equations with parameters and effects."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class Model:
         stated in full all the same; with it, what :func:`udd.discover` finds missing is a force that enters
         every acceleration, such as friction in a joint.
     inputs : sequence of str, optional
-        Measured inputs (exogenous signals), such as a motor's torque: names that the equations may use. What
-        was measured of them comes with the run or the record: ``udd.simulate(..., inputs=...)``,
+        Measured inputs (exogenous signals), such as a motor's torque: names that the equations may use. Their
+        samples come with the run or the record: ``udd.simulate(..., inputs=...)``,
         ``udd.Measurement(..., inputs=...)``.
     delays : mapping of str to str, optional
         Inputs that the model feels later, and sensors that are late, each with the parameter that is the
@@ -83,10 +83,10 @@ class Model:
     The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
 
     Where ``abs``, ``sign``, ``min``, ``max`` and ``where`` change, the equations have a kink or jump. Runs
-    land on up to six such surfaces (one on which the state can stick counts for two, all measured inputs
-    together for one), which are their events ``"kink"``, ``"jump"``, ``"stick"`` and ``"slip"``; power series
-    start anew there, and derivatives pass through, with a jump's saltation matrix. Any more are only
-    compared: runs go over them by small steps, and there is no power series.
+    land on up to six such surfaces and record the events ``"kink"``, ``"jump"``, ``"stick"`` and ``"slip"``.
+    A surface on which the state can stick counts for two, all measured inputs together for one. Power series
+    restart there; derivatives pass through, with a jump's saltation matrix. Runs cross further surfaces by
+    small steps, and such a model has no power series.
 
     Examples
     --------
@@ -113,7 +113,7 @@ class Model:
     inputs: ClassVar[tuple[str, ...]] = ()
     """Its measured inputs."""
     profile: ClassVar[ModelProfile]
-    """What is known of it beside its equations."""
+    """Its properties apart from the equations."""
     _plain: ClassVar[tuple[str, ...]]
     _options: ClassVar[tuple[str, ...]] = ("effects",)
     effects: tuple[Effect, ...]
@@ -170,7 +170,7 @@ class Model:
     def _spec(
         self,
     ) -> tuple[str, list[float], list[tuple[str, str | None, str | None, CoreFormula | None]], bool]:
-        """What the core needs to know."""
+        """Return the core's description of the model."""
         effects = [(e.name, e.momentum, e.treatment, e.spec.core_formula) for e in self.effects]
         return self.kind, list(self.parameters.values()), effects, getattr(self, "edge", "ignore") == "stop"
 

@@ -1,4 +1,4 @@
-"""What the models that are compiled into the core have in common."""
+"""Common parts of the models that are compiled into the core."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ class Disk(CompiledModel):
 
 
 def _crossing_rate(p: Parameters) -> Floats:
-    # As of the DLE, of which w = tau W/L.
+    # The rate of the DLE, with w = tau W/L.
     rate: Floats = np.sqrt(p["g"] * p["W"] / (4.0 * p["k0"])) / 10.0
     return rate
 
@@ -175,10 +175,10 @@ def _on_the_wheels(p: Parameters, states: Floats) -> NDArray[np.bool_]:
 #: Decades by which a stated speed or length may be off: cm, mm and their inverses.
 _DECADES = (-3, -2, -1, 1, 2, 3)
 _DEGREE = np.pi / 180
-_BEYOND = 5.0  # radii: no disk is as far from its contact, but one whose place is in cm is
-_SLOWEST = 0.5  # s between frames of a disk, which changes its motion in a quarter of that
-_NEAR = 0.25  # by how much a ratio may be off its unit
-_SURE = 0.7  # correlation from which on a slope counts
+_BEYOND = 5.0  # radii: a disk is closer to its contact unless its place is in cm
+_SLOWEST = 0.5  # s between frames; a disk changes its motion in a quarter of that
+_NEAR = 0.25  # largest relative error of a ratio
+_SURE = 0.7  # correlation above which a slope counts
 
 
 def _mistaken_unit(model: Disk, step: float, values: Floats) -> str | None:

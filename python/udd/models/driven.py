@@ -75,7 +75,7 @@ def moved_pendulum(
 
         inertia dOmega/dT = -length ((g + az) sin(theta) + ax cos(theta)) - k0 Omega    dtheta/dT = Omega
 
-    Of a pivot whose place was measured, the accelerations are ``x.rate().rate()`` of a signal with
+    If the place of the pivot was measured, the accelerations are ``x.rate().rate()`` of a signal with
     ``hold="cubic"``.
 
     Parameters

@@ -29,7 +29,7 @@ _POINT = "__"
 
 
 class FormulaText(NamedTuple):
-    """What the core needs to know of a formula model beside the values of its parameters."""
+    """The core's description of a formula model, without the values of its parameters."""
 
     states: list[str]
     equations: list[str]
@@ -57,20 +57,20 @@ class FormulaModel(Model):
     angles : tuple of str
         The states that are angles.
     effects : tuple of Effect
-        What was added to its equations: formulas and curves whose slot is a rate, as in ``"v'"``, or a force,
+        Terms added to its equations: formulas and curves whose slot is a rate, as in ``"v'"``, or a force,
         as in ``"force(x)"``.
     mass : tuple of tuple of str
-        The mass matrix; empty where none was given.
+        The mass matrix; empty if not given.
     inputs : tuple of str
         The measured inputs.
     delays : tuple of (str, str)
-        Inputs that are felt later and sensors that are late, each with the parameter that says by how much.
+        Inputs and sensors with a delay, each with the parameter of its delay.
     observe : tuple of (str, str)
-        The sensors' names and what they see; empty where the states are seen as they are.
+        The sensors' names and formulas; empty if the states themselves are measured.
     turning : tuple of str
-        Those of :attr:`channels` that are angles: a turn of an angle is a turn of what is seen.
+        Those of :attr:`channels` that are angles: a turn of an angle is a turn of the reading.
     records : tuple of mapping of str to InputSignal
-        What was measured of the inputs, record by record; empty until :meth:`with_inputs`.
+        The measured inputs, record by record; empty until :meth:`with_inputs`.
     record : int
         The number of the record that :meth:`rates` and runs follow.
     """
@@ -183,12 +183,12 @@ class FormulaModel(Model):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What a measurement may hold: the sensors, or all states where none were given."""
+        """The columns of a measurement: the sensors, or all states if there are no sensors."""
         return tuple(dict(self.observe)) or self.state_names
 
     @checked_arguments
     def observed(self, t: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
-        """What the sensors see of states (the output equation).
+        """Compute the sensor readings for given states (the output equation).
 
         Parameters
         ----------
@@ -199,8 +199,7 @@ class FormulaModel(Model):
         Returns
         -------
         ndarray, shape (..., c)
-            One column for each of :attr:`channels`. What is seen late is what the law makes of the state that
-            long before.
+            One column for each of :attr:`channels`. A delayed reading is that of an earlier state.
 
         Raises
         ------
@@ -279,7 +278,7 @@ class FormulaModel(Model):
 
     @checked_arguments
     def accelerations(self, along: str) -> dict[str, str]:
-        """What a unit force along a coordinate adds to the rates of the speeds, as formulas.
+        """Return the accelerations by a unit force along a coordinate, as formulas.
 
         Parameters
         ----------
@@ -328,12 +327,12 @@ class FormulaModel(Model):
 
     @property
     def _spec(self) -> tuple[str, list[float], list[Any], bool]:
-        """What the core needs to know; to it, effects are a part of the equations."""
+        """Return the core's description of the model; its equations contain the effects."""
         return self.kind, list(self.parameters.values()), [], False
 
     @property
     def _own(self) -> FormulaText:
-        """What the core needs to know beside the values."""
+        """Return the core's description without the values."""
         texts = dict(self.equations)
         for effect in self.effects:
             for state, factor in self._entered(effect.slots[0]).items():
@@ -466,7 +465,7 @@ class FormulaModel(Model):
         return FormulaModel(**arguments)._with(records=self.records, record=self.record)
 
     def _arguments(self) -> dict[str, Any]:
-        """What the constructor makes it of."""
+        """Return the arguments of the constructor."""
         return {
             "states": self.state_names,
             "equations": self.equations,
@@ -486,9 +485,9 @@ class FormulaModel(Model):
         ----------
         effects : iterable of Effect
             Formulas and curves whose slot is the rate of a state, as in
-            ``udd.effects.formula("v'", "c*abs(v)*v", c=-0.1)``; see also :meth:`with_term`. Of a model with a
-            mass matrix also a force along a coordinate, ``"force(b)"``, or between two, ``"force(b - a)"``,
-            which enters every acceleration.
+            ``udd.effects.formula("v'", "c*abs(v)*v", c=-0.1)``; see also :meth:`with_term`. A model
+            with a mass matrix also takes a force along a coordinate, ``"force(b)"``, or between two,
+            ``"force(b - a)"``, which enters every acceleration.
 
         Raises
         ------

@@ -33,8 +33,8 @@ def mechanism(
 ) -> FormulaModel:
     """Make a model of a mechanism from its equations of motion ``M(q) q'' = f(q, q', u, t)``.
 
-    The accelerations are those of Cramer's rule. What :func:`udd.discover` finds missing is a force, which
-    enters every acceleration through the mass matrix.
+    The accelerations are those of Cramer's rule. A missing term that :func:`udd.discover`
+    finds is a force, which enters every acceleration through the mass matrix.
 
     Parameters
     ----------

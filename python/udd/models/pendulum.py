@@ -99,7 +99,7 @@ class Pendulum(CompiledModel):
 
     @checked_arguments
     def with_gyroscope(self, *, angle: bool = False) -> FormulaModel:
-        """The same pendulum as a model whose rate of turn is measured, as by a phone on it.
+        """Return the pendulum as a model whose angular rate is measured, for example by a phone on it.
 
         ::
 
@@ -114,8 +114,8 @@ class Pendulum(CompiledModel):
         -------
         Model
             With the sensors ``Omega`` [rad/s] and, with `angle`, ``theta`` [rad]; ``length, k0, bias`` and
-            ``theta0`` are its parameters. Gravity and the inertia stand in its equation as numbers: with the
-            length free they would say the same.
+            ``theta0`` are its parameters. Gravity and the inertia are numbers in its equation: a fit cannot
+            distinguish them from the length.
 
         Raises
         ------

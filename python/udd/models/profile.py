@@ -1,8 +1,8 @@
-"""What is known of a model beside its equations: plain numbers and functions, one profile for each model.
+"""Profiles: the properties of models apart from the equations, as plain numbers and functions.
 
-A model's profile stands in the model's own file, with the reasons of its numbers. It is grouped by who reads
-it. Whoever needs to know something of a model asks ``model.profile``, or :func:`udd.models.profile_of` where
-only the kind is known, instead of which model it is.
+The file of each model defines its profile, with the reasons for its numbers. It has one group for each
+reader. Code that needs a property of a model reads ``model.profile``, or :func:`udd.models.profile_of` if
+only the kind is known, instead of testing for a model.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class DynamicsProfile:
 
 @dataclass(frozen=True)
 class SensorProfile:
-    """What a measurement of the model holds, and what a camera gets wrong.
+    """The columns of a measurement of the model, and the errors of a camera.
 
     Attributes
     ----------
@@ -166,32 +166,32 @@ def no_units(_model: Any) -> Iterator[OtherUnit]:
 
 @dataclass(frozen=True)
 class FitProfile:
-    """What a fit assumes before it has seen the data.
+    """The assumptions of a fit before it uses the data.
 
     Attributes
     ----------
     model_error : tuple of tuple of float
-        The model's assumed error over one frame of 40 ms, from loose to tight, per state in its unit. At the
-        loose end a wrong model follows the data, which is where the noise is estimated; at the tight end
-        small effects show. How tight is right for a fit the evidence says. Empty where the record says it.
+        The assumed model error of a search over one frame of 40 ms, from large to small, per state in its
+        unit. With a large one a wrong model follows the data and the noise is estimated; with a small one
+        weak effects show. A fit derives its model errors from the record. Empty if a search does so, too.
     searched : int or None
-        How many of these levels effects are sought at; None for all.
+        The number of these levels in a search; None for all.
     equations : mapping of str to str, or None
-        The states in whose equations something may be missing, with the unit in which that is told; None for
-        all but those that only say that one state is the rate of another.
+        The states in whose equations something may be missing, with the unit of the missing term; None for
+        all but those that define one state as the rate of another.
     priors : mapping of str to float, or None
-        What is free by default, with the relative standard deviations of the priors; infinite for none. None
-        for all parameters, without priors.
+        The free parameters by default, with the relative standard deviations of the priors; infinite without
+        a prior. By default all parameters are free, without priors.
     each : tuple of str
-        The parameters of which by default each of several measurements has a value of its own.
+        The parameters that by default have a separate value for each of several measurements.
     fixed : mapping of str to float
         Standard uncertainties of the parameters that a fit fixes, in the parameters' units.
     stated : tuple of str
         The parameters that a device's owner states: a fit far from them is one of something else.
     unknown : tuple of str
-        What is free where units are compared, as what is known least; empty where no units are.
+        The free parameters of a comparison of units: those known least; empty if no units are compared.
     hardly : int
-        How tightly a model is held there, as the place in `model_error`.
+        The model error of that comparison, as an index into `model_error`.
     mistaken_unit : callable
         ``(model, step, values) -> sentence or None``: what is wrong with the numbers of the frames seen,
         (n, m), `step` s apart, if they cannot be in s, m and rad.
@@ -268,42 +268,42 @@ class FurtherFilm(NamedTuple):
 
 
 def no_coordinates(_model: Any) -> tuple[Coordinate, ...]:
-    """Nothing beside the states and time."""
+    """Return no coordinates apart from the states and time."""
     return ()
 
 
 def no_films(_model: Any, _places: Floats) -> Iterator[FurtherFilm]:
-    """No other film can be made than a longer one."""
+    """Propose no further film; only a longer one helps."""
     return iter(())
 
 
 @dataclass(frozen=True)
 class DiscoveryProfile:
-    """How a search for what is missing goes about the model.
+    """The settings of a search for missing effects.
 
     Attributes
     ----------
     horizons : tuple of float
-        Lengths of the free runs on held-out data, s; of a user's own model, as all times here, in units of
-        the motion's time scale.
+        Lengths of the free runs on held-out data, s; for a user-defined model, like all times
+        here, in units of the motion's time scale.
     filter_window : float
         Data before each of them from which its state is filtered, s.
     filter_level : int
-        How tightly the model is held there, as the place in the levels of its error.
+        The model error of that filter, as an index into its levels.
     pairs : bool
-        Whether two effects at once are tried wherever one passes; otherwise only beside formulas.
+        True if a search also tries two effects at once after one passes; otherwise only with formulas.
     chaotic : bool
-        Whether a wrong model that is held tightly goes astray within seconds, so that scores around it name
-        the wrong effect. What dies down over minutes shows around a tight fit alone.
+        True if a wrong model with a small model error diverges within seconds, so that scores around it
+        select the wrong effect. A motion that decays over minutes shows effects only around such a fit.
     brakes : tuple of str
         Parameters that a pair of effects must not turn negative.
     coordinates : callable
-        ``(model) -> tuple of Coordinate``: what a curve may depend on beside the states and time.
+        ``(model) -> tuple of Coordinate``: further inputs of a curve apart from the states and time.
     slots : tuple of CurveSlot, or None
         Where a curve may enter; None for the equations themselves.
     films : callable
-        ``(model, places) -> iterator of FurtherFilm``: what could be filmed next of the device; `places` are
-        states of the record, the first one first.
+        ``(model, places) -> iterator of FurtherFilm``: proposals of the next film; `places` are states of the
+        record, in order.
     """
 
     horizons: tuple[float, ...] = (0.2, 0.4, 1.0, 2.0, 4.0)
@@ -318,13 +318,13 @@ class DiscoveryProfile:
 
 
 def no_words(_model: Any, _stated: Any) -> str:
-    """Nothing is known of the device."""
+    """Return no description of the device."""
     return ""
 
 
 @dataclass(frozen=True)
 class ShownProfile:
-    """What pictures and pages show of the model, and in which words.
+    """The words and views of the model in pictures and pages.
 
     Attributes
     ----------
@@ -373,13 +373,13 @@ class ShownProfile:
 
 @dataclass(frozen=True)
 class ModelProfile:
-    """What is known of a model beside its equations.
+    """The properties of a model apart from its equations.
 
     Attributes
     ----------
     written : bool
-        Whether the user wrote the equations: then states, units, sizes and times are the user's, any states
-        may be measured, and what else is needed is taken from the record.
+        True if the user wrote the equations: then states, units, sizes and times are the user's. Any states
+        may be measured, and the record gives all other settings.
     dynamics : DynamicsProfile
     sensor : SensorProfile
     fit : FitProfile

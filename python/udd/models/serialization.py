@@ -13,7 +13,7 @@ from .formula_model import FormulaModel
 from .mechanisms import mechanism
 from .registry import COMPILED
 
-#: What files call the kind of a model that is given as formulas; files of before say ``"own"``.
+#: The kind of a model given as formulas, in files; older files have ``"own"``.
 _FORMULA = "formula"
 _OWN = FormulaModel._options
 #: The three of these that a mechanism's equations of motion ``M q'' = f`` take the place of.

@@ -94,7 +94,7 @@ def depends_on_time(model: Model, size: Floats, after: float) -> bool:
 
 
 def _sizes(model: Model) -> tuple[dict[str, float], float]:
-    """What is large for the components that a model of ours has, and its typical time."""
+    """Return typical sizes of a predefined model's components, and its typical time."""
     sizes = model.profile.dynamics.sizes
     return ({}, 1.0) if sizes is None else sizes(model.parameters)
 
