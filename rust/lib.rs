@@ -4,7 +4,7 @@
 //! [`scalar`] (what a number is) → [`formula`] (what a user writes) → [`model`] (what is integrated) → [`tape`] (its power
 //! series) → [`integrate`] (how a step is taken) → [`observe`] (what is seen on the way) → [`analysis`] (runs, sections,
 //! exponents) → [`estimate`] (what measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
-//! Beside this stand [`image`], the inner loop of the tracker, and [`memory`], which know none of them.
+//! [`image`], the inner loop of the tracker, and [`memory`] use none of these.
 
 // Formulas over components are read with their indices.
 #![allow(clippy::needless_range_loop)]

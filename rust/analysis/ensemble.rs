@@ -53,9 +53,9 @@ pub struct EnsembleRun<const D: usize> {
 }
 
 impl<F: Family<D>, const D: usize> Ensemble<'_, F, D> {
-    /// Runs them all. `None` stands for runs that were not finished when the work was stopped.
+    /// Runs them all. `None` for a run that was not finished when the work stopped.
     pub fn run(&self, context: ExecutionContext<'_>) -> Vec<Option<EnsembleRun<D>>> {
-        // The steps are those of a run by itself, in which idle states do not count.
+        // The steps are those of a run by itself, in which padding states do not count.
         let tolerance = self.tolerance.filled::<D>(self.family.idle());
         Ensemble { tolerance, ..*self }.run_filled(order(&self.tolerance), context)
     }

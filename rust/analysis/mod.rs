@@ -1,4 +1,4 @@
-//! What is computed from runs: ensembles, Lyapunov exponents, sections, shooting.
+//! Analyses of runs: ensembles, Lyapunov exponents, sections, shooting.
 
 pub mod batch;
 mod ensemble;

@@ -14,14 +14,14 @@ type C = Complex<f64>;
 const MOST_SWEEPS: usize = 200;
 /// At first, and after so many more sweeps, one without a shift: it sorts the eigenvalues by their sizes.
 const UNSHIFTED: usize = 7;
-/// Of a real product: an eigenvalue with a smaller angle from the real axis is real.
+/// An eigenvalue of a real product with a smaller angle from the real axis is real.
 const REAL: f64 = 1e-9;
 
 /// One eigenvalue of a product: `phase * exp(log)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Multiplier {
     pub log: f64,
-    /// Of absolute value 1.
+    /// A number of absolute value 1.
     pub phase: C,
     /// The relative change of the eigenvalue for one of the size 1 of every factor: a bound to first order, but
     /// for the conditioning of the eigenvectors.
@@ -240,7 +240,7 @@ mod tests {
         found.iter().map(|one| one.phase * one.log.exp()).collect()
     }
 
-    /// Of no particular kind; the same every time.
+    /// A number without structure; the same every time.
     fn matrix(n: usize, seed: u64) -> DMatrix<f64> {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         DMatrix::from_fn(n, n, |_, _| {
@@ -266,7 +266,7 @@ mod tests {
                         .map(|(k, one)| (k, (one - value).norm()))
                         .min_by(|a, b| a.1.total_cmp(&b.1))
                         .unwrap();
-                    // Of the product itself the weak ones are known to its rounding alone.
+                    // The product itself gives the weak multipliers only to its rounding.
                     assert!(away < 1e-11 * scale, "{n} {m}: {value} off by {away:e} of {scale:e}");
                     known.remove(k);
                 }

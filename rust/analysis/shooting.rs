@@ -58,7 +58,7 @@ pub fn pieces<F: Family<D>, const D: usize>(
     stop: &CancelFlag,
 ) -> Result<Vec<SegmentEnd<D>>, Failure> {
     const { assert!(FEW + MOST_PARAMETERS <= DIRECTIONS && MOST_PARAMETERS <= FEW) };
-    // What is differentiated by stays open even where it vanishes.
+    // A parameter of a derivative stays open even if it is zero.
     let all = |p: usize| pieces.iter().all(|piece| piece.values[p] == 0.0) && !wanted.contains(&p);
     let width = pieces.first().map_or(0, |piece| piece.values.len());
     let known: Vec<_> = (0..width).map(|p| all(p).then_some(0.0)).collect();

@@ -1,4 +1,4 @@
-//! Whether a run's steps are held down by stability.
+//! Whether stability limits a run's steps.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -9,8 +9,8 @@ use crate::unroll::vector;
 const EVERY: u64 = 1000;
 /// It is stiff where it was found held down so many times in a row.
 const HELD: u32 = 15;
-/// A step is held down from this part of what its method is stable for: accuracy alone keeps it well below, except
-/// with tolerances beyond 1e-3.
+/// From this part of its method's stability limit on, stability limits a step: accuracy alone keeps it well below,
+/// except with tolerances beyond 1e-3.
 const PART: f64 = 0.5;
 /// So many multiplications by the law's derivative show its largest eigenvalue.
 const POWERS: usize = 10;
@@ -37,7 +37,7 @@ impl Stiffness {
     }
 }
 
-/// What is known on the way.
+/// The state of the test during the run.
 pub struct Look<const D: usize> {
     steps: u64,
     held: u32,

@@ -132,7 +132,7 @@ fn sampled<const D: usize>(
     Ok(Run { t, x, events, outcome, counts: run.counts(), record })
 }
 
-/// What `kept` bytes at time `t` say of the whole run.
+/// Estimates the whole run's bytes from `kept` bytes at time `t`.
 fn no_room(kept: usize, t: f64, (start, end): (f64, f64)) -> Failure {
     let kept = kept as f64;
     Failure::NoRoom { end, bytes: kept * (end - start) / (t - start), kept }

@@ -19,7 +19,7 @@ pub struct Bordered<const D: usize> {
     pub diagonal: Vec<SMatrix<f64, D, D>>,
     /// Couples frame `i + 1` (rows) with frame `i` (columns).
     pub below: Vec<SMatrix<f64, D, D>>,
-    /// `D` rows for each frame: its coupling with the parameters, and its right-hand side. What follows is idle.
+    /// `D` rows for each frame: its coupling with the parameters, and its right-hand side. The rest is padding.
     pub border: RowMatrix,
     /// The parameters' coupling with themselves, their right-hand side, and the sum of squares: a row for each,
     /// as wide as the border's, in which the numbers from the diagonal on to the right count.
@@ -44,7 +44,7 @@ impl<const D: usize> Bordered<D> {
         Self { diagonal: Vec::new(), below: Vec::new(), border: none(), corner: none() }
     }
 
-    /// As [`new`](Self::new), in the room of these equations: fresh memory costs as much as what is done in it.
+    /// As [`new`](Self::new), in the memory of these equations: to allocate costs as much time as the work.
     pub(super) fn anew<const M: usize>(
         self,
         linear: &Linearisation<D, M>,
@@ -68,8 +68,8 @@ impl<const D: usize> Bordered<D> {
         row[p] += precision * (mean - value);
     }
 
-    /// Gives the last `idle` states of every frame a weight of one, each by itself: they stay at zero, and neither the
-    /// cost nor the determinant knows of them.
+    /// Gives the padding states at the end of every frame a weight of one: they stay at zero, and change neither the
+    /// cost nor the determinant.
     pub(super) fn hold(&mut self, idle: usize) {
         for k in D - idle..D {
             self.diagonal.iter_mut().for_each(|own| own[(k, k)] = 1.0);
@@ -117,7 +117,7 @@ impl<const D: usize, const M: usize> Work for Assembly<'_, D, M> {
             }
             std::mem::swap(&mut now, &mut before);
             now.fill::<V>(linear, columns, record, i);
-            // By how much this frame and the one before take part in each row.
+            // The shares of this frame and of the one before in each row.
             let (mut h, mut h_back) = ([[0.0; M]; D], [[0.0; M]; D]);
             let mut remembered = false;
             for m in 0..M {
@@ -375,7 +375,7 @@ fn row_product<const D: usize>(a: &SMatrix<f64, D, D>, r: usize, b: &SMatrix<f64
 pub struct ReducedSystem<const D: usize> {
     /// Lower triangular.
     pivots: Vec<SMatrix<f64, D, D>>,
-    /// What couples frame `i + 1` with frame `i`, in units of the pivot of `i`.
+    /// The coupling of frame `i + 1` with frame `i`, in units of the pivot of `i`.
     links: Vec<SMatrix<f64, D, D>>,
     /// The borders in units of the pivots.
     solved: RowMatrix,
@@ -385,7 +385,7 @@ pub struct ReducedSystem<const D: usize> {
     pub gradient: DVector<f64>,
     /// Logarithm of the determinant of the states' part.
     pub log_determinant: f64,
-    /// By how much the states alone can lower the sum of squares.
+    /// The decrease in the sum of squares by the states alone.
     explained: f64,
 }
 
@@ -395,7 +395,7 @@ impl<const D: usize> ReducedSystem<D> {
         Bordered { diagonal: self.pivots, below: self.links, border: self.solved, corner: self.corner }
     }
 
-    /// By how much the linear model says that a change of the parameters lowers the cost, the states optimal.
+    /// The decrease in the cost that the linear model predicts for a change of the parameters, the states optimal.
     pub fn promise(&self, parameters: &DVector<f64>) -> f64 {
         self.explained + self.gradient.dot(parameters)
     }
@@ -437,11 +437,11 @@ impl<const D: usize> ReducedSystem<D> {
 /// The states' uncertainty, frame by frame.
 #[derive(Clone, Debug)]
 pub struct Covariances<const D: usize> {
-    /// A root of the parameters' covariance: its columns are independent changes. What follows them is zero.
+    /// A root of the parameters' covariance: its columns are independent changes. The rest is zero.
     pub root: RowMatrix,
     /// Their covariance were the parameters known.
     pub conditional: Vec<SMatrix<f64, D, D>>,
-    /// `D` rows for each frame: by how much they move with each of those changes.
+    /// `D` rows for each frame: its derivatives by those changes.
     pub shifts: RowMatrix,
 }
 

@@ -10,7 +10,7 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The misfits' cost: their squares in units of the noise, less what the frame before foretold of them.
+    /// The misfits' cost: the squares, in units of the noise, of what the frame before does not predict of them.
     pub(super) fn misfit_cost(&self, misfit: &[SVector<f64, M>]) -> f64 {
         let record = &self.record;
         if record.memory == [0.0; M] {

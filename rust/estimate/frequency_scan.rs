@@ -18,7 +18,7 @@ const BATCH: usize = 12;
 pub const BASIS: usize = 3;
 /// How a wave's cosine and sine are made of the cosines and sines of those.
 type Share = SMatrix<f64, { 2 * BASIS }, 2>;
-/// What those add to one row.
+/// The contribution of those to one row.
 type Local = [f64; 2 * BASIS];
 
 /// An effect `a cos(2 pi f t) + b sin(2 pi f t)` at a few frequencies, in one family: within a frame,

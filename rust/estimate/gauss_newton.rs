@@ -38,9 +38,9 @@ impl Default for Options {
 /// The sum of squares that is minimised, by its parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
-    /// Of the misfits, in units of their assumed noise.
+    /// The misfits', in units of their assumed noise.
     pub misfit: f64,
-    /// Of the defects, in units of the model's assumed error.
+    /// The defects', in units of the model's assumed error.
     pub defect: f64,
     /// Of the priors.
     pub prior: f64,
@@ -69,7 +69,7 @@ pub struct Solution<const D: usize, const M: usize> {
     pub covariance: DMatrix<f64>,
     /// Covariance of each frame's state.
     pub state_covariance: Vec<SMatrix<f64, D, D>>,
-    /// What was seen less what the model and the camera say, per frame.
+    /// Observation minus prediction by model and camera, per frame.
     pub misfit: Vec<SVector<f64, M>>,
     /// The variance of the estimate of what was seen, per frame and channel.
     pub seen_variance: Vec<SVector<f64, M>>,
@@ -95,7 +95,7 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The inverse variance of the model's error over each link; that of idle states plays no part.
+    /// The inverse variance of the model error over each link; the value for padding states has no effect.
     pub fn precision(&self) -> Vec<SVector<f64, D>> {
         let t = &self.record.t;
         let live = self.live();
@@ -130,7 +130,7 @@ where
         Ok(Iterate { point, linear, cost })
     }
 
-    /// Adds the free parameters' priors to normal equations at a point, and what holds idle states.
+    /// Adds the free parameters' priors to normal equations at a point, and fixes padding states.
     pub(super) fn add_priors(&self, point: &Unknowns<D>, system: &mut Bordered<D>) {
         for (j, free) in self.free.iter().enumerate() {
             system.prior(j, point.get(free), free.mean, free.sd);
@@ -162,7 +162,7 @@ where
             let full = self.step(&reduced, 0.0)?;
             let promise = reduced.promise(&full.parameters);
             let done = promise < options.decrease || still == ENOUGH;
-            // What is left to gain at the end; at a kink it is not to be had.
+            // The remaining gain at the end; at a kink it cannot be reached.
             let left = if promise < options.decrease { promise } else { 0.0 };
             if done || iteration > options.iterations {
                 return self.finish(here, &reduced, left, (iteration, done));
@@ -241,7 +241,7 @@ where
         moved
     }
 
-    /// What is asked of the minimum, at a point that is above it by what is `left` to gain.
+    /// Collects the results at a point whose cost is above the minimum by `left`.
     fn finish(
         &self,
         Iterate { point, linear, cost }: Iterate<D, M>,

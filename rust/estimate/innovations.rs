@@ -1,4 +1,4 @@
-//! What each frame brings that the frames before it did not foretell: white noise, if the model is right.
+//! Innovations: the part of each frame that the frames before do not predict; white noise if the model is right.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use crate::analysis::batch::cancel;
 use crate::inverse::invert;
 use crate::model::Family;
 
-/// A filter foretells nothing before it has seen so many frames.
+/// A filter predicts nothing before so many frames.
 const SETTLED: usize = 12;
 
 impl<F, C, const D: usize, const M: usize> Estimator<F, C, D, M>
@@ -97,7 +97,7 @@ impl Filter {
         }
     }
 
-    /// Looks at a frame, and puts what it brings in its place where enough is known; none where that cannot be told.
+    /// Filters a frame and returns its innovation; none if the frames before do not determine it.
     /// Matrices are given by their columns.
     fn see(&mut self, root: &[f64], h: &[f64], misfit: &[f64], brought: &mut [f64]) -> Option<()> {
         let (states, channels) = (self.states, misfit.len());
@@ -106,7 +106,7 @@ impl Filter {
         if there.is_empty() {
             return Some(());
         }
-        // What is seen of state and noise: h x + root^-1 e.
+        // The observation of state and noise: h x + root^-1 e.
         let rows = there.len();
         let mut noise = DMatrix::from_fn(rows, rows, |r, c| root(there[r], there[c]));
         assert!(invert(noise.as_mut_slice(), rows), "the diagonal of a triangle has no zero");

@@ -81,7 +81,7 @@ where
         }
     }
 
-    /// The same, in the room of another: fresh memory costs as much as what is done in it.
+    /// The same in the memory of another: to allocate costs as much time as the work.
     pub(super) fn linearise_in(
         &self,
         point: &Unknowns<D>,
@@ -97,7 +97,7 @@ where
         Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } })
     }
 
-    /// What is seen of every frame, and its rows of the free parameters.
+    /// The observation of every frame, and its rows of the free parameters.
     fn sights(
         &self,
         point: &Unknowns<D>,
@@ -108,7 +108,7 @@ where
     ) {
         let (n, p) = (self.record.t.len(), self.free.len());
         seen.become_zeros(n * M, p);
-        // All are filled anew.
+        // All are filled again.
         sights.resize(n, ObservationResidual { misfit: zeros(), h: zeros() });
         let beyond = self.beyond(point);
         let views = views(&point.sets, &self.free, timed);
@@ -127,7 +127,7 @@ where
         });
     }
 
-    /// What was seen in frame `i` less what should have been.
+    /// Observation minus prediction in frame `i`.
     #[inline(always)]
     fn misfit(&self, i: usize, expected: &[f64; M]) -> SVector<f64, M> {
         let mut misfit: SVector<f64, M> = zeros();
@@ -226,8 +226,8 @@ impl<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> Work for Loo
     }
 }
 
-/// What a sensor sees with these instructions, what is late where its law is given: a function of its own, which is long
-/// beside what is done with it.
+/// The observation by a sensor with these instructions, with delays if the law is given. It is a separate function
+/// because it is long.
 #[inline(always)]
 fn see<V: InstructionSet, C: Sensor<D, M>, B: System<Wide, D>, const D: usize, const M: usize>(
     sensor: &C,
@@ -263,7 +263,7 @@ impl<C: Sensor<D, M>, B: System<Wide, D>, const D: usize, const M: usize> Work f
 #[inline(always)]
 fn fill<const M: usize>(rows: &mut [f64], p: usize, seen: &[Wide; M], first: usize, columns: &[usize]) {
     for m in 0..M {
-        // Those that find no room beside the state are told of elsewhere.
+        // Parameters without room next to the state have their rows elsewhere.
         for k in 0..columns.len().min(WIDTH.saturating_sub(first)) {
             rows[m * p + columns[k]] = seen[m].d[first + k];
         }

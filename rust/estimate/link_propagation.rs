@@ -10,10 +10,10 @@ use crate::scalar::{Dual, Isa, Scalar, Wide};
 use crate::tape::Tape;
 use crate::unroll::vector;
 
-/// A link takes a few steps; where a fit's numbers have gone astray, as near a formula's pole, it would take
-/// very many, and the fit had better turn back at once.
+/// A link takes a few steps. If a fit diverges, for example near a formula's pole, it would take very many, and the
+/// fit should turn back at once.
 const MOST_STEPS: u64 = 1000;
-/// Links are taken by so many at least: what follows them is made once for all.
+/// A thread takes at least so many links: their integrator is made once for all.
 const TOGETHER: usize = 64;
 
 /// A film's model with its parameters' values, over any number.
@@ -25,10 +25,11 @@ pub(super) struct Law<B, S> {
 type BySeries<'a, const D: usize> =
     Integrator<&'a dyn AnySystem<Wide, D>, Wide, D, MaybeTangents, Taylor<'a, Wide, D>>;
 
-/// What follows one film's links. It is compiled once for each number of states: a series is of the law's tape, and
+/// The integrator of one film's links. It is compiled once for each number of states: a series is of the law's tape,
+/// and
 /// beside so many derivatives a call costs little.
 pub(super) enum TransitionIntegrator<'a, const D: usize> {
-    /// By the law's power series: most links take one step. Where it does not serve they are taken by the other.
+    /// By the law's power series: most links take one step. If it fails the other one takes the link.
     Series(Box<BySeries<'a, D>>, Tolerance),
     /// By a Runge-Kutta method, where the law has no series.
     Stages(Box<Integrator<&'a dyn AnySystem<Wide, D>, Wide, D>>),
@@ -101,7 +102,7 @@ where
     let (sides, mut switched) = (*driver.sides(), false);
     while driver.t() != end {
         driver.advance(end)?;
-        // What only time switches needs no more care.
+        // Switches by time alone need no further care.
         switched |= (0..driver.system().surfaces()).any(|j| driver.sides()[j] != sides[j]);
         steps += 1;
         if steps > MOST_STEPS {
@@ -150,7 +151,7 @@ where
         self.record.linked[i].then(|| (film, self.record.t[i] * pace, self.record.t[i + 1] * pace))
     }
 
-    /// The model's operations. What vanishes in all films and is held is left out.
+    /// The model's operations. Fixed parameters that are zero in all films are left out.
     fn tape(&self, point: &Unknowns<D>) -> Option<Tape<D>> {
         let free = |p: usize| self.free.iter().any(|free| free.role == Role::Model(p));
         let zero = |p: usize| point.sets.iter().all(|set| set.model[p] == 0.0) && !free(p);
@@ -158,7 +159,7 @@ where
         Tape::record(&self.family, &known).ok()
     }
 
-    /// What `one` makes of every link, given its number, its span and where to keep it; `none` for frames that are
+    /// Calls `one` for every link with its number, its span and the place of its result; `none` for frames that are
     /// not linked. It is kept where `found` was.
     #[allow(clippy::type_complexity, reason = "a name for it would take as many parameters")]
     pub(super) fn each_link<T: Clone + Send + Sync>(

@@ -31,7 +31,7 @@ pub struct QuadraturePoint<const D: usize> {
     pub response: SMatrix<f64, D, D>,
 }
 
-/// What acts on a link.
+/// The forcing of a link.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadraturePoints<const D: usize> {
     /// Whether the law switched on the way: derivatives by its parameters then jump between the places.
@@ -39,7 +39,7 @@ pub struct QuadraturePoints<const D: usize> {
     pub places: [QuadraturePoint<D>; PLACES_PER_LINK],
 }
 
-/// What becomes of a frame's state until the next frame.
+/// The flow of a frame's state to the next frame.
 #[derive(Clone, Debug)]
 pub struct Transition<const D: usize> {
     /// The next frame's state less what the model makes of this one.
@@ -47,8 +47,8 @@ pub struct Transition<const D: usize> {
     /// The derivatives of what the model makes: by this frame's state, then by those of the model's free
     /// parameters that find room.
     pub slopes: [[f64; WIDTH]; D],
-    /// The derivatives by those components of this frame's state that find no room there, one after the other; those by
-    /// idle ones are zero.
+    /// The derivatives by those components of this frame's state that have no room there, one after the other; those
+    /// by padding components are zero.
     pub further: Vec<[f64; D]>,
     /// The rate at the end.
     pub end_rate: SVector<f64, D>,
@@ -73,8 +73,8 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// Every link, kept where `room` was; those of frames that are not linked are all zero. What is
-    /// [further](Transition::further) is not worked out here.
+    /// Every link, kept where `room` was; those of frames that are not linked are all zero. This leaves out the
+    /// [further](Transition::further) derivatives.
     pub(super) fn flow(
         &self,
         point: &Unknowns<D>,
@@ -107,7 +107,7 @@ where
         self.each_link(point, laws, &one, &none, room)
     }
 
-    /// What acts on every link; all zero where frames are not linked.
+    /// The forcing of every link; zero if frames are not linked.
     pub fn places(&self, point: &Unknowns<D>) -> Result<Vec<QuadraturePoints<D>>, EstimateError> {
         let (laws, live) = (self.own_laws(point), self.live());
         let place = QuadraturePoint { since: 0.0, t: 0.0, state: [0.0; D], response: zeros() };

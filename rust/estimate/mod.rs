@@ -1,4 +1,4 @@
-//! What measured motion says about the model.
+//! Estimation: what measured motion says about the model.
 //!
 //! Weak-constraint multiple shooting: unknown are the state at every frame, the model's parameters
 //! and the camera's. Minimised is
@@ -67,7 +67,7 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// How many states are not idle.
+    /// The number of live states.
     #[inline]
     pub(super) fn live(&self) -> usize {
         D - self.family.idle()

@@ -1,4 +1,4 @@
-//! What a change of parameters does to the states and to what is seen.
+//! Derivatives of the states and of the observations by parameters.
 
 use nalgebra::SVector;
 
@@ -41,7 +41,7 @@ impl ParameterJacobian {
     }
 }
 
-/// From where time counts in the model's equations.
+/// The origin of time in the model's equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TimeOrigin {
     /// The record's own time.
@@ -50,8 +50,8 @@ pub(super) enum TimeOrigin {
     Frame,
 }
 
-/// What found no room in the first directions: the state from component `first` on, and behind it some parameters, by
-/// which laws are differentiated; and the columns of these, film by film.
+/// The derivatives without room in the first directions: by the state from component `first` on, then by some
+/// parameters of the laws; and the columns of these, film by film.
 pub(super) struct FurtherDirections<B> {
     pub first: usize,
     pub columns: Vec<Vec<usize>>,
@@ -146,14 +146,14 @@ where
                 }
             }
         });
-        // Idle states leave their directions to parameters.
+        // The directions of padding states serve parameters.
         for slopes in flow.iter_mut().flat_map(|link| &mut link.slopes) {
             (live..D.min(WIDTH)).for_each(|k| slopes[k] = 0.0);
         }
         Ok(())
     }
 
-    /// What found no room in the first directions goes the way again.
+    /// Derivatives without room in the first directions need another pass.
     fn further_rows(
         &self,
         point: &Unknowns<D>,

@@ -2,12 +2,12 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// What was seen, frame by frame: one film, or several one after the other.
+/// A record, frame by frame: one film, or several one after the other.
 #[derive(Clone, Debug)]
 pub struct Record<const M: usize> {
     /// Time of each frame, s, increasing within a film.
     pub t: Vec<f64>,
-    /// What was seen; any number where the information is zero.
+    /// The observation; any number if the information is zero.
     pub seen: Vec<SVector<f64, M>>,
     /// The inverse covariance of the noise; zero where a channel was not seen.
     pub information: Vec<SMatrix<f64, M, M>>,
@@ -15,7 +15,7 @@ pub struct Record<const M: usize> {
     pub linked: Vec<bool>,
     /// Which film each frame belongs to, and so which [`FilmParameters`] of parameters holds.
     pub film: Vec<usize>,
-    /// How much of a frame's noise is still there in the next one, per channel: its autocorrelation.
+    /// The lag-1 autocorrelation of the noise, per channel.
     pub memory: [f64; M],
 }
 
@@ -34,8 +34,8 @@ impl<const M: usize> Default for Record<M> {
 }
 
 impl<const M: usize> Record<M> {
-    /// How much of channel `m`'s noise in frame `i` is still that of the frame before, given whether that one
-    /// was seen: noise begins anew after a gap.
+    /// The correlation of channel `m`'s noise in frame `i` with that of the frame before, if that one was observed:
+    /// noise is independent after a gap.
     #[inline(always)]
     pub(super) fn remembered(&self, i: usize, m: usize, seen_before: bool) -> f64 {
         if i > 0 && self.linked[i - 1] && seen_before { self.memory[m] } else { 0.0 }

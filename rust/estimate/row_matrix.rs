@@ -118,7 +118,7 @@ pub(super) struct OuterProductSum {
 }
 
 impl OuterProductSum {
-    /// Of rows of this width; the sign says whether they are added or taken away.
+    /// For rows of this width; the sign says whether they are added or subtracted.
     pub fn new(width: usize, sign: f64) -> Self {
         Self { rows: RowMatrix::zeros(COLLECTED, width), collected: 0, sign }
     }
@@ -133,7 +133,7 @@ impl OuterProductSum {
         }
     }
 
-    /// Adds what was collected, with these instructions. What lies left of the diagonal is only partly filled.
+    /// Adds what was collected, with these instructions. The part left of the diagonal is only partly filled.
     #[inline(always)]
     pub fn flush<V: InstructionSet>(&mut self, sum: &mut RowMatrix) {
         run_with::<V, _>(Flush { squares: self, sum });

@@ -27,19 +27,20 @@ pub trait Sensor<const D: usize, const M: usize>: Clone + Send + Sync {
     /// Whether a channel is an angle: what was seen of it counts modulo a turn.
     fn is_angle(&self, channel: usize) -> bool;
 
-    /// The model's parameter that says by how much a channel is late.
+    /// The model's parameter for the delay of a channel.
     fn delay(&self, _channel: usize) -> Option<usize> {
         None
     }
 
-    /// What is seen of a state.
+    /// The observation of a state.
     fn observe<S: Scalar>(&self, camera: &[S], at: &Moment<'_, S, D>) -> [S; M];
 }
 
 /// How closely the way back to a late sensor's moment is followed.
 const BACK: Tolerance = Tolerance::new(1e-8, 1e-10);
 
-/// What a sensor sees; of channels that are late, what it was then. Not a number where the law leads from nowhere to
+/// The observation by a sensor; for delayed channels the observation at the earlier time. Not a number where the law
+/// leads from nowhere to
 /// that moment's state.
 #[inline(always)]
 pub fn seen<S, C, const D: usize, const M: usize>(
@@ -75,7 +76,7 @@ pub(super) fn see_late<S, C, const D: usize, const M: usize>(
     }
 }
 
-/// What is seen of the state a while before.
+/// The observation of an earlier state.
 #[inline(never)]
 fn late<S, C, const D: usize, const M: usize>(
     sensor: &C,
@@ -104,7 +105,7 @@ pub(super) fn rates<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S,
     system.rates(t, x, &sides_of(system, t, x))
 }
 
-/// The distance at which `lens` is told, m.
+/// The distance at which `lens` counts, m.
 const ARM: f64 = 0.1;
 
 /// A camera that sees `Y`, `Z` and `beta` of the disk, with its imperfections:
@@ -119,8 +120,8 @@ const ARM: f64 = 0.1;
 /// clockwise, `lens` is how much farther from the picture's middle `m` a lens shows what lies at the distance
 /// A = 0.1 m from there, `(right, up)` is where the marks' centre lies on the disk, seen with the red mark on top
 /// (marks are glued by hand), the orientation is seen as it was `lag` before the position, and with a rolling
-/// shutter a point at height `Z` is exposed at `t - row Z`. What is a mean over an exposure of duration `e` lies off
-/// the middle of a curved path: `shutter` is then `e^2/24`.
+/// shutter a point at height `Z` is exposed at `t - row Z`. A mean over an exposure of duration `e` lies off the
+/// middle of a curved path: `shutter` is then `e^2/24`.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskCamera;
 
@@ -198,7 +199,7 @@ impl Sensor<2, 1> for AngleSensor {
 #[derive(Clone, Debug)]
 pub struct FormulaSensor<const D: usize> {
     observation: Observation,
-    /// How many states are not idle.
+    /// The number of live states.
     states: usize,
     /// The components that are angles, where they are seen as they are.
     angles: [bool; D],

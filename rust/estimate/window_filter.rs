@@ -10,7 +10,7 @@ use crate::analysis::batch::parallel::try_map;
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 
-/// What a window of frames says on its own.
+/// The estimate from a window of frames alone.
 #[derive(Clone, Copy, Debug)]
 pub struct Filtered<const D: usize> {
     /// The state at the first frame.
@@ -54,7 +54,7 @@ where
         })
     }
 
-    /// What would be seen at increasing times after each start `(film, time, state)`, by the model alone.
+    /// Predicts the observations at increasing times after each start `(film, time, state)`, by the model alone.
     pub fn predict(
         &self,
         sets: &[FilmParameters],

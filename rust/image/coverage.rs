@@ -146,7 +146,7 @@ impl Work for ExposureIntegral<'_> {
         let count = copies as usize;
         for k in 0..count {
             let s = (k as f64 + 0.5) / copies - 0.5;
-            // it stands at the mean of its part, which lies off the middle where the path bends: of s^2 that is
+            // its place is the mean of its part, which lies off the middle where the path bends: of s^2 that is
             // s^2 + 1/(12 n^2)
             let off = 1.0 / (12.0 * copies * copies);
             let bent = Pose {
@@ -205,7 +205,7 @@ fn add(
     }
 }
 
-/// Blurred indicator of |x| < half: the quintic smooth step of equal variance stands for the error function.
+/// Blurred indicator of |x| < half: the quintic smooth step of equal variance replaces the error function.
 #[inline(always)]
 fn slab(x: f32, half: f32, inverse: f32) -> f32 {
     let z = ((half - x.abs()) * inverse).clamp(-1.0, 1.0);

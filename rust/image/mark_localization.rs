@@ -11,7 +11,7 @@ use crate::scalar::{InstructionSet, Isa, Work};
 pub struct Plane<'a> {
     pub codes: &'a [u8],
     pub view: &'a [bool],
-    /// What to multiply each pixel's light by so that the bare disk is equally bright everywhere; empty: it is.
+    /// Factors of each pixel's light that make the bare disk equally bright everywhere; empty if it is.
     pub even: &'a [f32],
     pub height: usize,
     pub width: usize,
@@ -24,7 +24,7 @@ pub struct Appearance<'a> {
     pub light: &'a [f64; 256],
     /// Blur of lens and pixels, standard deviation in pixels.
     pub psf: f64,
-    /// Of the light on a flat part of the disk.
+    /// The noise of the light on a flat part of the disk.
     pub noise: f64,
     /// Pixels by which edges may differ from the ideal shape.
     pub misfit: f64,
@@ -34,7 +34,7 @@ pub struct Appearance<'a> {
     pub rim: f64,
 }
 
-/// What one mark says.
+/// The estimate from one mark.
 pub struct MarkObservation {
     /// How far it is off, in pixels of the plane.
     pub offset: [f64; 2],

@@ -1,4 +1,4 @@
-//! What a camera makes of a rectangular mark on a moving disk, and where in a picture such marks are.
+//! Images of rectangular marks on a moving disk, and the places of such marks in a picture.
 //!
 //! Knows no model and no Python: numbers in, numbers out. The tracker's inner loop.
 

@@ -9,7 +9,7 @@ use super::mark_localization::{Appearance, MarkObservation, Plane, locate};
 /// How fast the disk moves at mid-exposure, for rows that are exposed at times of their own.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PoseRate {
-    /// Of its centre [pixels/s].
+    /// The velocity of its centre [pixels/s].
     pub rate: [f64; 2],
     /// Of turning [rad/s].
     pub spin: f64,
@@ -37,13 +37,13 @@ pub struct PoseStep {
     pub change: [f64; 3],
     /// Its information for unit noise.
     pub information: Matrix3<f64>,
-    /// What remains of each mark's offset [pixels], None where it is not seen.
+    /// The residual offset of each mark [pixels]; None if it is not visible.
     pub leftover: Vec<Option<[f64; 2]>>,
     /// The square of that in units of its noise.
     pub chi2: Vec<Option<f64>>,
 }
 
-/// What the last round saw, and what it made of it.
+/// The input and the result of the last round.
 pub struct PoseFit {
     pub pose: Pose,
     pub sightings: Vec<Option<MarkObservation>>,

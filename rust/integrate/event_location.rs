@@ -2,8 +2,9 @@
 //!
 //! A step is taken with the side of every surface frozen. Then [`SurfaceMonitor::find`] looks on the step's
 //! polynomial for the first place where a surface's sign contradicts its side. For surfaces that are as slow as the state
-//! a few places are enough; [`sign_changes`] decides on all others, and where these places leave it open. A lane that crosses takes
-//! its step anew up to there, and [`EventIteration`] corrects the step's size until the surface's function is
+//! a few places are enough; [`sign_changes`] decides on all others, and where these places leave it open. A lane that
+//! crosses takes its step again up to there, and [`EventIteration`] corrects the step's size until the surface's
+//! function is
 //! zero; the other lanes go on meanwhile.
 
 use std::cell::Cell;
@@ -16,7 +17,7 @@ use crate::model::{EnclosedSurfaces, MAX_SURFACES, Sides, System, choose};
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
-/// What can be crossed: the switching surfaces, then the wall.
+/// The targets of crossings: the switching surfaces, then the wall.
 pub const TARGETS: usize = MAX_SURFACES + 1;
 pub const WALL: usize = MAX_SURFACES;
 
@@ -100,7 +101,7 @@ pub fn suspect_in_turn<M: System<S, D>, S: Scalar, const D: usize>(
     }
 }
 
-/// What a step does to the targets, lane by lane.
+/// The effect of a step on the targets, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Found<R: Real> {
     /// Lanes whose first crossing is of this target.
@@ -162,7 +163,7 @@ where
         self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
     }
 
-    /// Looks at the method's last trial, of size `h`, in these lanes: in most steps there is nothing to find.
+    /// Looks at the method's last trial, of size `h`, in these lanes: most steps cross no target.
     #[inline(always)]
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.system.watched());

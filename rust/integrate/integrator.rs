@@ -10,7 +10,7 @@ use crate::model::{AnySystem, MAX_SURFACES, Sides, System, choose, sides_of};
 use crate::scalar::{self, InstructionSet, Isa, Mask, Real, Scalar};
 use crate::unroll::{unroll, vector};
 
-/// What the work was, summed over the lanes.
+/// The work, summed over the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Steps accepted.
@@ -50,14 +50,14 @@ impl Ending {
     }
 }
 
-/// What one trial step of a single run did.
+/// The result of one trial step of a single run.
 enum Attempted {
     Moved,
     Failed,
     Rejected,
 }
 
-/// What one trial step did, lane by lane.
+/// The result of one trial step, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<M> {
     /// Lanes that took a step, be it one of no length onto the surface that they are on.
@@ -95,7 +95,7 @@ pub struct Integrator<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S,
     run: Run<S, D>,
 }
 
-/// Where a run stands. What it does seldom, against its steps, is compiled once for each kind of number.
+/// Where a run stands. Its rare work is compiled once for each kind of number.
 struct Run<S: Scalar, const D: usize> {
     /// Whether lanes end on the wall.
     wall: bool,
@@ -162,7 +162,7 @@ where
         self
     }
 
-    /// Starts anew in these lanes, as [`new`](Integrator::new) does.
+    /// Restarts these lanes, as [`new`](Integrator::new) does.
     #[inline(always)]
     pub fn start(&mut self, lanes: S::Mask, t: S::Real, x: [S; D], h: Option<S::Real>) {
         let run = &mut self.run;
@@ -205,8 +205,8 @@ where
         }
     }
 
-    /// Goes on with another system, to whose parameters these values belong; lanes whose parameters
-    /// change are to be [started](Integrator::start) anew.
+    /// Continues with another system, to whose parameters these values belong. [Start](Integrator::start) lanes again
+    /// if their parameters change.
     #[inline(always)]
     pub fn set_system(&mut self, system: M, values: &[S]) {
         self.system = system;
@@ -332,7 +332,7 @@ where
         run.work.trials = tick(active, run.work.trials, 1.0);
 
         let judged = active.and(landing.not());
-        // A series knows its own size: there is nothing to learn from one step for the next.
+        // A series gives its own step size: one step says nothing about the next.
         let (good, factor) = match K::SERIES {
             true => (trial.error.finite(), S::Real::one()),
             false => self.controller.judge(trial.error, judged),
@@ -515,7 +515,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         let mut landed = EventStatus { there: never, grazed: never };
 
         if landing.any() {
-            // What landing lanes want is the value of their own target.
+            // Landing lanes need the value of their own target.
             let mut value = S::Real::zero();
             for target in 0..TARGETS {
                 if !self.landing.on[target].any() {
@@ -594,7 +594,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
             progress.moved = progress.moved.or(told);
             let mut seen = crossed.or(told).and(turned);
             if target != WALL && law.jumps(target) {
-                // What the switch led to, such as a contact that sticks, says more than where it began.
+                // The side after the switch, such as a contact that sticks, says more than the side before.
                 for j in (0..law.surfaces()).rev() {
                     let changed =
                         before[j].and(self.at.sides[j].not()).or(self.at.sides[j].and(before[j].not()));

@@ -1,4 +1,4 @@
-//! What a one-step method is to the stepping loop.
+//! The interface of a one-step method to the stepping loop.
 
 use super::tolerance::ErrorNorm;
 use crate::model::{AnySystem, Sides, System};
@@ -21,7 +21,7 @@ pub struct StepStart<S: Scalar, const D: usize> {
     pub sides: Sides<S>,
 }
 
-/// What a trial step gives.
+/// The result of a trial step.
 #[derive(Clone, Copy, Debug)]
 pub struct Trial<S: Scalar, const D: usize> {
     /// The new state.
@@ -100,7 +100,7 @@ pub trait Method<S: Scalar, const D: usize> {
     fn polynomial(&self, coefficients: &mut Vec<[S; D]>) -> S::Real;
 }
 
-/// What landing asks of a [`Method`] whose type is forgotten. See the methods of the same names.
+/// The part of a [`Method`] that landing needs, whatever its type. See the methods of the same names.
 pub(super) trait Course<S: Scalar, const D: usize> {
     fn begin(&mut self, law: &dyn AnySystem<S, D>, at: &StepStart<S, D>, lanes: S::Mask);
     fn begin_next(&mut self, lanes: S::Mask);

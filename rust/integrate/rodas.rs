@@ -134,7 +134,8 @@ type SlopesAt<'a, const D: usize> = dyn Fn(&StepStart<f64, D>) -> Slopes<D> + 'a
 ///
 /// The derivatives of the law are exact, from dual numbers.
 pub struct Rodas<'a, const D: usize> {
-    /// The derivatives at any time and state. Whose law it is is forgotten, as in all that is compiled for this method.
+    /// The derivatives at any time and state. The type of the law is erased, as in all code that is compiled for this
+    /// method.
     slopes_at: Box<SlopesAt<'a, D>>,
     /// Where the derivatives are known, and what they are.
     known: Option<StepStart<f64, D>>,

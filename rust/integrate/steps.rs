@@ -12,7 +12,7 @@ const MOST: usize = 64;
 /// compiled once for each number of states. See the integrator's methods of the same names.
 pub trait Steps<const D: usize> {
     /// Takes accepted steps up to `end`, until one reaches the time `wanted` or does not end freely, but only so many
-    /// that whoever wants the run to stop need not wait. The steps before the last one are not to be looked at.
+    /// that a request to stop need not wait. The steps before the last one are not to be looked at.
     fn advance(&mut self, end: f64, wanted: f64) -> Result<Ending, Failure>;
     fn t(&self) -> f64;
     fn x(&self) -> &[f64; D];

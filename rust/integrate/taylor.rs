@@ -47,8 +47,9 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
 
     /// Halves steps whose polynomial does not obey the law at their end; fails where none does.
     ///
-    /// A law that has nearly levelled off, as tanh does, has terms too small to tell how near its poles are; so has
-    /// a series with gaps, such as one in powers of t^4, where the last terms fall into one. Where it has levelled
+    /// If a law has nearly levelled off, as tanh does, its terms are too small to show the distance of its poles. The
+    /// same holds for a series with gaps, such as one in powers of t^4, if the last terms fall into one. Where it has
+    /// levelled
     /// off entirely the polynomial may be wrong on the way only.
     #[inline(never)]
     fn obey(&mut self, at: &StepStart<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
@@ -90,7 +91,8 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     }
 }
 
-/// By how much the rates of the polynomial at a distance `dt` miss those of the law, over a step of this `size`, in
+/// The difference between the polynomial's rates at a distance `dt` and those of the law, over a step of this `size`,
+/// in
 /// units of what its error may be; `x` is the state there.
 struct Defect<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
@@ -150,7 +152,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
             self.jets.set_inputs(self.tape, &|k| system.input(k, at.t, &at.sides));
         }
         let mut trial = S::Real::work(self.jets.isa(), Attempt { method: self, at, h, norm });
-        // What is written out is known to have no gaps.
+        // Written-out series have no gaps.
         if !self.tape.is_unrolled() {
             self.obey(at, norm, &mut trial);
         }

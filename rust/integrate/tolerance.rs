@@ -11,14 +11,14 @@ pub trait ErrorNorm<S: Scalar, const D: usize> {
     /// The norm of the error of a step from one state to another: 1 where it is just allowed.
     fn of_step(&self, error: &[S; D], before: &[S; D], after: &[S; D]) -> S::Real;
 
-    /// What the terms of a series that starts with `start` are weighed by.
+    /// The weights of the terms of a series that starts with `start`.
     type Weights;
     fn weights(&self, start: &[S; D]) -> Self::Weights;
 
     /// The square of a term's norm.
     fn of_term(&self, term: &[S; D], weights: &Self::Weights) -> S::Real;
 
-    /// What is allowed for the state alone.
+    /// The tolerance of the state alone.
     fn state(&self) -> &Tolerance;
 }
 
@@ -49,8 +49,8 @@ impl Tolerance {
         Self { rtol, atol, max_step: f64::INFINITY }
     }
 
-    /// The tolerance whose norm over `D` components, of which `idle` rest and have no error, is this one's over the
-    /// others.
+    /// The tolerance whose norm over `D` components equals this one's over the live components; `idle` of them rest
+    /// and have no error.
     pub fn filled<const D: usize>(&self, idle: usize) -> Self {
         let factor = ((D - idle) as f64 / D as f64).sqrt();
         Self { rtol: self.rtol * factor, atol: self.atol * factor, ..*self }

@@ -4,8 +4,8 @@ use super::{EnclosedSurfaces, Piece, Sides, System};
 use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
-/// Any [`System`]. What is asked of it seldom, against the steps of a run, is compiled for a `dyn AnySystem` once for each
-/// kind of number instead of once for each model.
+/// Any [`System`]. Code that runs rarely is compiled for a `dyn AnySystem`: once for each kind of number instead of
+/// once for each model.
 pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     /// See the methods of the same names of [`System`].
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];

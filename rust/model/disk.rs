@@ -57,7 +57,7 @@ impl<S: Scalar> Friction<S> {
 /// that can stick has two more.
 const KINK: usize = 1;
 
-/// What moves the disk: the torque, all told, on its inertia, and the contact's velocity.
+/// The total torque on the disk, its inertia, and the contact's velocity.
 pub(super) struct EquationOfMotion<S> {
     pub torque: S,
     pub inertia: S,
@@ -71,7 +71,7 @@ fn speed_of<S: Scalar>(omega: S, sides: &Sides<S>) -> S {
 }
 
 impl<S: Scalar> Disk<S> {
-    /// What an effect may look at, over the disk's own scalar or over duals of it.
+    /// The inputs of an effect, over the disk's own scalar or over duals of it.
     #[inline(always)]
     fn at<A: Scalar<Mask = S::Mask>>(
         &self,

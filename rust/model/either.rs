@@ -4,9 +4,9 @@ use super::{EnclosedSurfaces, Family, Parameter, Piece, Sides, System};
 use crate::integrate::{Probes, StepStart, TARGETS};
 use crate::scalar::Scalar;
 
-/// A model of one kind or of another, told apart when the program runs.
+/// A model of one kind or of another, distinguished at run time.
 ///
-/// What is done with models is compiled once for each: two that share an `Either` share it.
+/// Code over models is compiled once for each: two models that share an `Either` share the code.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Either<A, B> {
     First(A),
@@ -101,7 +101,7 @@ where
 impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
     type Built<S: Scalar> = Either<A::Built<S>, B::Built<S>>;
 
-    // What one is worth in packets is not worth compiling the other for them.
+    // The gain of packets for one of them does not pay for compiling the other.
     const PACKETS: bool = A::PACKETS && B::PACKETS;
 
     fn goes_in_packets(&self) -> bool {

@@ -46,7 +46,7 @@ enum InputValues<S> {
 #[derive(Clone, Debug)]
 pub struct Own<S, const D: usize> {
     law: Arc<Law>,
-    /// What the parameters determine of the rates, and of each surface.
+    /// The part of the rates, and of each surface, that the parameters determine.
     fixed: Vec<S>,
     fixed_surfaces: Vec<Vec<S>>,
     sliding: Vec<SlidingSurface<S>>,
@@ -195,7 +195,7 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
     fn jumps(&self, j: usize) -> bool {
         match (self.law.kinks.jumps.get(j), &self.inputs) {
             (Some(&jumps), _) => jumps,
-            // What is let go starts with the rates that it had: that switch is continuous.
+            // A contact that starts to slip begins with its rates at rest: that switch is continuous.
             (None, InputValues::Measured(inputs)) => j == self.knots() && inputs.jumps(),
             (None, _) => false,
         }
@@ -255,7 +255,7 @@ pub struct FormulaFamily<const D: usize> {
 }
 
 impl<const D: usize> FormulaFamily<D> {
-    /// Parses the right-hand sides, in the order of the states; with fewer than `D` the last states are idle.
+    /// Parses the right-hand sides, in the order of the states; with fewer than `D` the rest is padding.
     ///
     /// # Errors
     /// The number of the equation and what is wrong with it, in words that continue "the formula ...".
@@ -298,7 +298,7 @@ impl<const D: usize> FormulaFamily<D> {
         self
     }
 
-    /// What sensors see of it.
+    /// Its observation by sensors.
     pub fn observation(&self) -> &Observation {
         &self.observation
     }
@@ -319,7 +319,7 @@ impl<const D: usize> FormulaFamily<D> {
         self
     }
 
-    /// The same with idle states up to the number `E`.
+    /// The same with padding states up to the number `E`.
     ///
     /// # Panics
     /// Where there are more than `E` states already.
@@ -337,7 +337,7 @@ impl<const D: usize> FormulaFamily<D> {
         }
     }
 
-    /// The names of the states that are not idle, and which of them are angles.
+    /// The names of the live states, and which of them are angles.
     pub fn states(&self) -> Vec<(String, bool)> {
         self.states.clone()
     }

@@ -75,7 +75,7 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         [true; D]
     }
 
-    /// What it is called when the state gets to this side of surface `j`, for the record of events.
+    /// The name of the event in which the state reaches this side of surface `j`.
     fn surface_name(&self, _j: usize, _side: bool) -> &'static str {
         ""
     }

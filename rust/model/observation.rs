@@ -1,4 +1,4 @@
-//! What sensors see of a user's own model, given as text.
+//! The observation of a user-defined model by sensors, as text.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::MAX_SURFACES;
 use crate::formula::{Expression, Mistake, Names, Place, Program};
 use crate::scalar::Scalar;
 
-/// A sensor's channel: the parameter by how much it is late, and whether it is an angle.
+/// A sensor's channel: the parameter of its delay, and whether it is an angle.
 #[derive(Clone, Debug, PartialEq)]
 struct Channel {
     delay: Option<usize>,
@@ -26,13 +26,12 @@ struct Channel {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     channels: Arc<[Channel]>,
-    /// What the channels see.
+    /// The readings of the channels.
     seen: Arc<Program>,
 }
 
 impl Observation {
-    /// Parses the channels' formulas, each with the number of the parameter by how much it is late, and whether it is an
-    /// angle.
+    /// Parses the channels' formulas, each with the number of the parameter of its delay, and whether it is an angle.
     ///
     /// # Errors
     /// The number of the channel and what is wrong with its formula, in words that continue "the formula ...".
@@ -62,12 +61,12 @@ impl Observation {
         self.channels.get(channel).is_some_and(|own| own.angle)
     }
 
-    /// The parameter that says by how much a channel is late.
+    /// The parameter for the delay of a channel.
     pub fn delay(&self, channel: usize) -> Option<usize> {
         self.channels.get(channel)?.delay
     }
 
-    /// What the channels see; zero beyond the last one.
+    /// The readings of the channels; zero beyond the last one.
     #[inline(never)]
     pub fn values<S: Scalar, const M: usize>(&self, t: S, x: &[S], rates: &[S], parameters: &[S]) -> [S; M] {
         let mut all = [S::zero(); M];

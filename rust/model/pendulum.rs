@@ -43,7 +43,7 @@ impl<S: Scalar> Pendulum<S> {
         }
     }
 
-    /// The torque, all told, and what dry friction does beside it.
+    /// The total torque, and the part of dry friction that is no torque.
     #[inline]
     pub(super) fn torque(
         &self,

@@ -56,7 +56,7 @@ impl<S: Scalar> SlidingSurface<S> {
         sides[self.mode].and(sides[self.surface].not())
     }
 
-    /// Takes from these numbers, where the mask is true, so much along the gradient.
+    /// Subtracts this multiple of the gradient from the numbers, if the mask is true.
     fn take(&self, numbers: &mut [S], amount: S, here: S::Mask) {
         let part = amount / self.along(&self.gradient);
         for (own, &slope) in numbers.iter_mut().zip(&self.gradient) {

@@ -57,7 +57,7 @@ pub trait Slider<S: Scalar, const D: usize> {
         Contact { sign, bristle: S::zero() }
     }
 
-    /// The rate of `Omega`, which is held where the contact sticks.
+    /// The rate of `Omega`, which is zero while the contact sticks.
     #[inline(always)]
     fn held(&self, rate: S, sides: &Sides<S>) -> S {
         match self.sticking() {
@@ -76,7 +76,7 @@ pub trait Slider<S: Scalar, const D: usize> {
             let (_, dry) = self.at_rest(t, x, sides);
             return S::select(sides[REVERSAL], x[0], -x[0]) - dry.band;
         }
-        // At first no side is known, and all are taken for true.
+        // Initially no side is known, and all count as true.
         let moving = x[0].less(S::zero()).or(S::zero().less(x[0]));
         let mut open = sides[Self::STUCK].and(moving.not());
         if banded {
@@ -132,7 +132,7 @@ pub trait Slider<S: Scalar, const D: usize> {
         x[0] = S::select(sticks, S::zero(), x[0]);
     }
 
-    /// What it is called when the body gets to this side of [`Slider::BAND`] or [`Slider::STUCK`].
+    /// The name of the event in which the body reaches this side of [`Slider::BAND`] or [`Slider::STUCK`].
     fn contact_event(&self, j: usize, side: bool) -> &'static str {
         match (j == Self::STUCK, side) {
             (true, true) => "stick",
@@ -145,7 +145,7 @@ pub trait Slider<S: Scalar, const D: usize> {
     fn contact_jumps(&self, j: usize) -> bool {
         match self.sticking() {
             Sticking::Never => false,
-            // What is let go starts to slide with no acceleration: that switch is continuous.
+            // A contact that starts to slip has no acceleration at first: that switch is continuous.
             Sticking::AtRest => j == REVERSAL,
             Sticking::InBand => j == REVERSAL || j == Self::BAND || j == Self::STUCK,
         }

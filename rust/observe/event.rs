@@ -3,7 +3,7 @@
 use crate::integrate::{Ending, Steps};
 use crate::model::System;
 
-/// What an event is.
+/// Events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
     /// A switching surface was crossed to this side.

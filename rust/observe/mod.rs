@@ -1,4 +1,4 @@
-//! What is seen on the way: samples at given times, and events.
+//! Output during a run: samples at given times, and events.
 
 mod event;
 mod record;

@@ -306,7 +306,8 @@ fn innovations<'py>(
     array(py, &[size.frames, size.channels], found)
 }
 
-/// What would be seen at `times[k]`, increasing, after start `k` of film `film[k]` at `t0[k]`, by the model alone.
+/// Predicts the observations at `times[k]`, increasing, after start `k` of film `film[k]` at `t0[k]`, by the model
+/// alone.
 #[pyfunction]
 fn predict<'py>(
     py: Python<'py>,

@@ -1,8 +1,8 @@
-//! The estimator whatever its family and its sensor: plain numbers in, plain numbers out. What is on Python's side
-//! of it is compiled once.
+//! The estimator whatever its family and its sensor: plain numbers in, plain numbers out. The code on Python's side
+//! is compiled once.
 //!
-//! Of own models with more than four states the estimator is compiled for twelve: others have idle states, which nobody
-//! sees, at their end. Here these are added to what comes in, and cut from what goes out.
+//! For user-defined models with more than four states the estimator is compiled for twelve: smaller models get
+//! unobserved padding states at the end. Here these are added to what comes in, and cut from what goes out.
 
 use std::sync::Arc;
 
@@ -61,7 +61,7 @@ pub struct Asked<'a> {
     pub free: Vec<FreeParameter>,
     /// Plays no part where nothing was measured.
     pub diffusion: &'a [f64],
-    /// What a solve left at this point.
+    /// The results of a solve at this point.
     pub linear: Option<&'a Linearised>,
 }
 
@@ -154,14 +154,14 @@ pub trait Fitted: Send + Sync {
     fn predict(&self, film: &[usize], t0: &[f64], times: &[Vec<f64>]) -> Result<Vec<f64>, EstimateError>;
 }
 
-/// An estimator at a point, and how a model of its own kind is told from others.
+/// An estimator at a point, and the test for a model of the same kind.
 pub struct Fit<F: Family<D>, C: Sensor<D, M>, const D: usize, const M: usize> {
     pub estimator: Estimator<F, C, D, M>,
     pub point: Unknowns<D>,
     own: fn(AnyModel) -> Option<(F, Vec<f64>)>,
 }
 
-/// With idle states up to a number that the estimator is compiled for, which is as many as channels at least.
+/// Adds padding states up to a number that the estimator is compiled for, at least the number of channels.
 fn filled(model: AnyModel) -> AnyModel {
     let Some(family) = model.widest() else { return model };
     let (states, channels) = (family.states().len(), family.observation().len());
@@ -249,7 +249,7 @@ where
     F: Family<D>,
     C: Sensor<D, M>,
 {
-    /// The numbers of states and channels that are not idle.
+    /// The numbers of live states and channels.
     fn live(&self) -> (usize, usize) {
         (D - self.estimator.family.idle(), self.estimator.sensor.channels())
     }
@@ -356,7 +356,7 @@ where
     }
 }
 
-/// What a candidate with these values has more than the model, and its amplitudes.
+/// The values that a candidate has in addition to the model, and its amplitudes.
 fn added(values: &[f64], own: usize, indices: &[usize]) -> PyResult<(Vec<f64>, Vec<Role>)> {
     if values.len() < own || indices.iter().any(|&index| index >= values.len()) {
         return Err(PyValueError::new_err("a candidate has no parameter of that number"));

@@ -1,4 +1,4 @@
-//! What the core reads in a formula's text.
+//! Parsing of a formula's text by the core.
 
 use pyo3::prelude::*;
 

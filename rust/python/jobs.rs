@@ -97,7 +97,7 @@ impl Jobs<'_, '_> {
     }
 }
 
-/// A signal that nothing tells of: on Ctrl-C what is finished is kept, and rows that are not say so.
+/// A signal without a message: on Ctrl-C what is finished is kept, and rows that are not say so.
 pub fn lost(py: Python<'_>, signal: PyResult<()>, outcomes: &[u8]) -> PyResult<()> {
     match signal {
         Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) && outcomes.contains(&INTERRUPTED) => {
@@ -119,7 +119,7 @@ pub fn values(model: &AnyModel, values: &PyReadonlyArray2<'_, f64>) -> PyResult<
     Ok(values.rows().into_iter().map(|row| row.to_vec()).collect())
 }
 
-/// Rows of initial states, of which the last `idle` components are zero.
+/// Rows of initial states, padded at the end with `idle` zeros.
 pub fn starts<const D: usize>(starts: &PyReadonlyArray2<'_, f64>, idle: usize) -> PyResult<Vec<[f64; D]>> {
     let (starts, wanted) = (starts.as_array(), D - idle);
     if starts.nrows() == 0 || starts.ncols() != wanted {
@@ -131,7 +131,7 @@ pub fn starts<const D: usize>(starts: &PyReadonlyArray2<'_, f64>, idle: usize) -
     Ok(starts.rows().into_iter().map(state).collect())
 }
 
-/// Of numbers that come in rows of `width` the first `live` of each row: those of states that are not idle.
+/// The first `live` numbers of each row of `width`: those of live states.
 pub fn live(numbers: Vec<f64>, width: usize, live: usize) -> Vec<f64> {
     if width == live {
         return numbers;

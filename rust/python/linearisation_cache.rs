@@ -1,4 +1,4 @@
-//! What a solve has worked out, kept for those who ask for more at the same point.
+//! The linearisation of a solve, kept for later requests at the same point.
 
 use std::any::Any;
 
@@ -26,7 +26,7 @@ impl Linearised {
         Self(Box::new(of))
     }
 
-    /// What is known for an estimator; nothing where another record or model was linearised, or by other parameters.
+    /// The linearisation for an estimator; none if another record or model was linearised, or by other parameters.
     pub fn known<F, C, const D: usize, const M: usize>(
         &self,
         of: &Estimator<F, C, D, M>,
@@ -45,7 +45,7 @@ impl Linearised {
     }
 }
 
-/// Whether the same was seen. What was not is not a number: only its bits are the same.
+/// Whether the same was seen. An unobserved value is NaN: only its bits are the same.
 fn same_bits<const M: usize>(own: &[SVector<f64, M>], other: &[SVector<f64, M>]) -> bool {
     let mut same = own.len() == other.len();
     for i in 0..own.len().min(other.len()) {

@@ -30,7 +30,7 @@ struct Table {
     failure: Option<String>,
 }
 
-/// What one orbit puts into the columns.
+/// One orbit's entries in the columns.
 struct Row<'a> {
     value: &'a [f64],
     standard_error: &'a [f64],
@@ -58,7 +58,7 @@ fn table<F: Family<D>, const D: usize>(
     all: bool,
     context: ExecutionContext<'_>,
 ) -> Table {
-    // Of many states one exponent alone is not worth its compilation.
+    // For many states a single exponent does not pay for its compilation.
     if const { D <= 4 } && !all {
         return collect(&orbits.run::<1>(context));
     }
@@ -130,7 +130,7 @@ fn lyapunov<'py>(
         PyArray1::from_vec(py, cut).reshape([count, wanted])
     };
     let wanted = if all { live } else { 1 };
-    // Of idle states: the rows at the end, then the columns.
+    // Those of padding states: the rows at the end, then the columns.
     let product =
         jobs::live(jobs::live(table.product, dimension * dimension, live * dimension), dimension, live);
     let dict = PyDict::new(py);

@@ -32,14 +32,14 @@ pub enum AnyModel {
     /// With LuGre friction, whose bristles are one more state.
     Five(Either<WithLuGre<DiskFamily>, FormulaFamily<5>>, Vec<f64>),
     Six(FormulaFamily<6>, Vec<f64>),
-    /// With 7 to 12 states, the last of which may be idle.
+    /// With 7 to 12 states, padding included.
     Twelve(FormulaFamily<12>, Vec<f64>),
     /// Apart from the others of three states, whose laws are smooth.
     BristledPendulum(WithLuGre<PendulumFamily>, Vec<f64>),
 }
 
-/// Runs the expression with the model's family and values, whatever its dimension. The DLE is told apart before: its law
-/// is so short that to ask at every stage of a step which law it is costs a fifth.
+/// Runs the expression with the model's family and values, whatever its dimension. The DLE is distinguished before:
+/// its law is so short that a choice of the law at every stage costs a fifth.
 macro_rules! with_model {
     ($model:expr, |$family:ident, $values:ident| $body:expr) => {
         match $model {
@@ -93,7 +93,7 @@ const KINDS: [&str; 3] = ["dle", "disk", "pendulum"];
 type FormulaSpec = (String, String, Vec<String>, Vec<String>);
 /// An effect's name, momentum and treatment, and its formula where it is a user's own.
 type EffectSpec = (String, Option<String>, Option<String>, Option<FormulaSpec>);
-/// What a Python model's `_spec` holds: kind, values, effects, edge.
+/// A Python model's `_spec`: kind, values, effects, edge.
 type Spec = (String, Vec<f64>, Vec<EffectSpec>, bool);
 
 impl AnyModel {
@@ -180,7 +180,7 @@ impl AnyModel {
         Ok(model)
     }
 
-    /// The names of the state's components that are not idle, and which of them are angles, which may grow without end.
+    /// The names of the live components, and which of them are angles, which may grow without limit.
     pub fn states(&self) -> Vec<(String, bool)> {
         let names: &[&str] = match self {
             AnyModel::Three(Either::First(_), _) => &["omega", "y", "z"],
@@ -210,8 +210,8 @@ impl AnyModel {
         ))
     }
 
-    /// With idle states up to a number that analyses are compiled for: own models of one state as if there were two, those
-    /// of five as if there were six.
+    /// With padding states up to a number that analyses are compiled for: models of one state get a second one, those
+    /// of five a sixth.
     pub fn filled(self) -> Self {
         match self {
             AnyModel::One(family, values) => AnyModel::Two(Either::Second(family.filled()), values),
@@ -220,7 +220,7 @@ impl AnyModel {
         }
     }
 
-    /// The family of a user's own model with idle states up to the most that there are.
+    /// The family of a user's own model with padding states up to the largest number.
     pub fn widest(&self) -> Option<FormulaFamily<MAX_STATES>> {
         Some(match self {
             AnyModel::One(family, _) => family.filled(),
@@ -266,7 +266,7 @@ impl AnyModel {
     }
 }
 
-/// What a user's own model consists of, as `udd.models.formula_model.FormulaText`.
+/// The parts of a user-defined model, as `udd.models.formula_model.FormulaText`.
 #[derive(FromPyObject)]
 struct FormulaModelSpec<'py> {
     states: Vec<String>,
@@ -283,7 +283,7 @@ struct FormulaModelSpec<'py> {
     observe: Vec<ChannelSpec>,
 }
 
-/// What a sensor sees: its channel's name, the formula, the parameter by how much it is late, and whether it is an angle.
+/// A sensor's channel: its name, the formula, the parameter of its delay, and whether it is an angle.
 type ChannelSpec = (String, String, Option<String>, bool);
 
 /// As `udd.InputSignal`.
@@ -370,7 +370,7 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
     .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))
 }
 
-/// What sensors see of a user's own model.
+/// The observation of a user-defined model by sensors.
 fn observation(channels: &[ChannelSpec], names: Names<'_>) -> PyResult<Observation> {
     if channels.len() > MAX_STATES {
         let message = format!("a model has at most {MAX_STATES} sensors, not {}", channels.len());
@@ -476,7 +476,7 @@ fn formula_bodies(name: &str, spec: FormulaSpec) -> PyResult<Vec<&'static str>> 
     Ok(formula(name, &spec)?.bodies().iter().map(|body| body.name()).collect())
 }
 
-/// The state as an array of the dimension asked for, of which the last `idle` components are zero.
+/// The state as an array of the dimension asked for, padded at the end with `idle` zeros.
 pub fn state<const D: usize>(values: &[f64], idle: usize) -> PyResult<[f64; D]> {
     let wanted = D - idle;
     if values.len() != wanted {
@@ -542,7 +542,7 @@ fn rates<'py>(
     Ok(PyArray1::from_vec(model.py(), out))
 }
 
-/// What sensors see of a user's own model, frame by frame.
+/// The observation of a user-defined model by sensors, frame by frame.
 #[pyfunction]
 fn observed<'py>(
     model: &Bound<'py, PyAny>,

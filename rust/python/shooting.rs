@@ -1,4 +1,4 @@
-//! What `udd.equilibria`, `udd.periodic_orbit` and `udd.continuation` are made of.
+//! The core of `udd.equilibria`, `udd.periodic_orbit` and `udd.continuation`.
 
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
@@ -60,7 +60,7 @@ fn shoot<'py>(
         let rows = jobs::live(values, dimension * width, live * width);
         dict.set_item(name, PyArray1::from_vec(py, rows).reshape(shape.to_vec())?)
     };
-    // Of idle states the columns here, the rows in `set`.
+    // The columns of padding states are cut here, the rows in `set`.
     let by_state = jobs::live(flown.by_state, dimension, live);
     set("x", flown.x, 1, &[count, live])?;
     set("by_state", by_state, live, &[count, live, live])?;
@@ -114,7 +114,7 @@ fn expansion<'py>(
         let x = state(&x, family.idle())?;
         let found = linear(family, values, t, &x);
         let more = if all { higher(family, values, t, &x) } else { Default::default() };
-        // Idle states are cut from every axis.
+        // Every axis leaves out padding states.
         let cut = |numbers: Vec<f64>, axes: u32| {
             let mut numbers = numbers;
             for axis in 0..axes {

@@ -38,13 +38,13 @@ struct Flat {
 /// A run as a function of time.
 trait Piecewise: Send + Sync {
     fn span(&self) -> (f64, f64);
-    /// The number of states that are not idle.
+    /// The number of live states.
     fn dimension(&self) -> usize;
     /// Appends the state at `t`; false outside the run.
     fn append(&self, t: f64, out: &mut Vec<f64>) -> bool;
 }
 
-/// A run of which so many states at the end are idle.
+/// A run with so many padding states at the end.
 struct Recorded<const D: usize> {
     record: Record<D>,
     idle: usize,
@@ -214,7 +214,7 @@ fn simulate<'py>(
     let model = AnyModel::from_python(model)?;
     let tolerance = Tolerance { rtol, atol, max_step };
     let by = if method == "rodas" { RunMethod::Rodas } else { RunMethod::Explicit(stepper(method)?) };
-    // The models that are built in are not stiff; where they come to rest steps are held down, too.
+    // The predefined models are not stiff, but stability limits their steps when they stop.
     let watched = model.is_own();
     let stiffness = Stiffness::new(method == "auto");
     let told = Cell::new(method == "auto");

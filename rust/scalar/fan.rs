@@ -24,7 +24,7 @@ impl<V: InstructionSet> DerivativeLanes<V> {
         Self::of(Packet::new([number, a, b, c]))
     }
 
-    /// What of this is not used costs nothing.
+    /// Unused parts cost nothing.
     #[inline(always)]
     fn of(all: Packet<4, V>) -> Self {
         let mut derivatives = all;

@@ -9,7 +9,7 @@ pub const LANES: usize = 8;
 /// A set of vector instructions. Results do not depend on it, only speed does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Isa {
-    /// What every machine of the architecture has: SSE2 on x86-64, NEON on AArch64.
+    /// The instructions of every machine of the architecture: SSE2 on x86-64, NEON on AArch64.
     Baseline,
     /// AVX2 with fused multiply-add.
     Avx2,
@@ -24,7 +24,7 @@ pub trait InstructionSet: Copy + Debug + PartialEq + Send + Sync + 'static {
     const ISA: Isa;
 }
 
-/// What the compiler makes of plain loops, on any machine.
+/// The compiler's own code for plain loops, on any machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(16))]
 pub struct Plain;

@@ -1,4 +1,4 @@
-//! What a number is.
+//! Numbers: plain ones, packets, dual numbers.
 //!
 //! Every model is written once, generic over [`Scalar`]. Run over `f64` it gives a trajectory; over
 //! [`Dual`] numbers it gives tangents and parameter sensitivities, exact to rounding; over a [`Packet`]
@@ -158,7 +158,7 @@ pub fn constants<S: Scalar>(values: &[f64]) -> Vec<S> {
 
 /// A number without derivatives: one lane (`f64`) or several ([`Packet`]).
 pub trait Real: Scalar<Real = Self> {
-    /// How many trajectories it stands for.
+    /// The number of its trajectories.
     const LANES: usize;
 
     /// Does work over such numbers with these instructions; packets that are made of some bring their own.

@@ -56,7 +56,7 @@ fn each<const L: usize>(mut lane: impl FnMut(usize) -> f64) -> [f64; L] {
     all
 }
 
-/// What a truth value is in a mask.
+/// The representation of a truth value in a mask.
 #[inline(always)]
 fn truth(value: bool) -> f64 {
     f64::from_bits(if value { !0 } else { 0 })
@@ -226,8 +226,8 @@ impl<const L: usize, V: InstructionSet> Scalar for Packet<L, V> {
     fn sqrt(self) -> Self {
         Self::new(lanes::sqrt::<L, V>(&self.0))
     }
-    // Not inlined: models use these seldom, and their code is long over eight lanes. What is hot calls
-    // `elementary` itself.
+    // Not inlined: models use these seldom, and their code is long over eight lanes. Hot code calls `elementary`
+    // itself.
     #[inline(never)]
     fn exp(self) -> Self {
         isa::run_with::<V, _>(Exp(self))

@@ -76,7 +76,7 @@ where
     /// Starts a job in a lane.
     #[inline(always)]
     pub fn load(&mut self, lane: usize, job: usize, start: Start<'_, S, D>) {
-        // Of packets it is a part of what has their instructions.
+        // For packets it is part of the code with their instructions.
         if const { S::Real::LANES > 1 } {
             self.load_here(lane, job, start);
         } else {
@@ -98,7 +98,7 @@ where
             lanes.set_lane(lane, start.values[i]);
             self.values[i] = S::lift(lanes);
         }
-        // What is evaluated once for all steps stays otherwise.
+        // Otherwise values that are evaluated once for all steps stay.
         if changed {
             self.driver.set_system(self.family.build(&self.values), &self.values);
         }

@@ -42,7 +42,7 @@ pub struct Dop853Factory;
 impl<const D: usize> MethodFactory<D> for Dop853Factory {
     type Method<S: Scalar> = Dop853<S, D>;
 
-    // Who wants many runs fast takes another: its twelve stages in packets are not worth their compilation.
+    // Use another method for many fast runs: its twelve stages in packets are not worth their compilation.
     const PACKETS: bool = false;
     const FORGETS: bool = true;
 

@@ -1,5 +1,5 @@
-//! Work on all cores. What threads need is compiled once, whatever they work on; where a result is kept does
-//! not depend on who made it, nor on when.
+//! Work on all cores. The code for threads is compiled once for all kinds of work. The place of a result does not
+//! depend on which thread made it, or when.
 
 use std::convert::Infallible;
 use std::process;
@@ -38,7 +38,7 @@ fn pool() -> Option<&'static ThreadPool> {
     Some(fresh)
 }
 
-/// The lock is taken for microseconds: one of so many trials succeeds.
+/// A thread keeps the lock for microseconds, so that one of so many trials succeeds.
 const MOST_TRIALS: usize = 1000;
 
 /// How many threads work on the parts of a list.
@@ -102,7 +102,7 @@ pub fn try_in_parts<T: Send, E: Send>(list: &mut [T], least: usize, work: &Parts
     let failed: Mutex<Option<(usize, E)>> = Mutex::new(None);
     let sooner = |k: usize, failed: &Option<(usize, E)>| matches!(failed, Some((first, _)) if *first < k);
     each_index(parts.len(), &|k| {
-        // Locks are there to hand a part over: nobody else wants it.
+        // The lock only hands a part over: no other thread uses it.
         let Ok(mut part) = parts[k].lock() else { return };
         if sooner(k, &failed.lock().unwrap_or_else(PoisonError::into_inner)) {
             return;
@@ -120,10 +120,10 @@ pub fn try_in_parts<T: Send, E: Send>(list: &mut [T], least: usize, work: &Parts
     }
 }
 
-/// What is made of the numbers below `count`, in their order.
+/// Results for the numbers below `count`, in their order.
 ///
 /// # Errors
-/// That of the first that fails.
+/// The error of the first number that fails.
 pub fn try_map<T: Send, E: Send>(
     count: usize,
     one: &(dyn Fn(usize) -> Result<T, E> + Sync),

@@ -12,7 +12,7 @@ use crate::scalar::{InstructionSet, Isa, LANES, Packet, Real, Work};
 pub struct Queue<'a> {
     next: AtomicUsize,
     jobs: usize,
-    /// What each thread may begin with, so that none goes without.
+    /// The jobs that each thread may begin with, so that every thread gets some.
     share: usize,
     only: Option<&'a [usize]>,
     stop: &'a CancelFlag,
@@ -32,7 +32,7 @@ impl Queue<'_> {
         self.share.min(R::LANES)
     }
 
-    /// What asks the work to end.
+    /// The flag that asks the work to end.
     pub fn stop(&self) -> &CancelFlag {
         self.stop
     }
@@ -43,7 +43,7 @@ impl Queue<'_> {
     }
 }
 
-/// What one thread's jobs yield. They are put in their places in batches: memory is touched once.
+/// The results of one thread's jobs. They are put in their places in batches: memory is touched once.
 #[derive(Debug)]
 pub struct ResultSink<'a, Y> {
     batch: Vec<(usize, Y)>,
@@ -75,9 +75,9 @@ impl<Y> ResultSink<'_, Y> {
 /// Takes jobs one by one until none is left.
 pub type OneByOne<'a, Y> = dyn Fn(&Queue<'_>, &mut ResultSink<'_, Y>) + Sync + 'a;
 
-/// What packets do with the jobs of a queue.
+/// The work of packets on the jobs of a queue.
 pub trait BatchJob: Sync {
-    /// What a job yields.
+    /// The result of a job.
     type Yield: Send;
 
     /// Whether packets are worth it.
@@ -104,7 +104,8 @@ pub struct ExecutionContext<'a> {
     pub stop: &'a CancelFlag,
 }
 
-/// What the jobs yield, in their order; `None` for those that were not finished when the work was stopped. They go in
+/// The results of the jobs, in their order; `None` for those that were not finished when the work was stopped. They
+/// go in
 /// `packets` where there are some, else one by one.
 pub fn run_batch<T: BatchJob>(
     packets: Option<&T>,
@@ -171,7 +172,8 @@ impl<T: BatchJob> Work for InPackets<'_, '_, '_, T> {
         if const { !T::PACKETS || matches!(V::ISA, Isa::Baseline) } {
             return;
         }
-        // Of two registers one works while the other waits for a result; numbers with derivatives do so anyway, and two
+        // With two registers one works while the other waits for a result; numbers with derivatives do so anyway, and
+        // two
         // registers for each part leave too few.
         if const { T::DERIVATIVES > 0 && matches!(V::ISA, Isa::Avx2) } {
             self.work.run_batch::<Packet<4, V>>(self.queue, self.results);

@@ -16,14 +16,14 @@ pub struct SeriesFamily<'a, const D: usize> {
     idle: usize,
 }
 
-/// What a [`SeriesFamily`] builds.
+/// The system of a [`SeriesFamily`].
 pub struct SeriesSystem<'a, S, const D: usize> {
     rates: &'a Rates<'a, D>,
     parameters: Vec<S>,
 }
 
 impl<'a, const D: usize> SeriesFamily<'a, D> {
-    /// For a family with these rates and so many idle states.
+    /// A family with these rates and so many padding states.
     pub fn new(rates: &'a Rates<'a, D>, idle: usize) -> Self {
         Self { rates, idle }
     }
@@ -54,7 +54,7 @@ impl<'a, const D: usize> Family<D> for SeriesFamily<'a, D> {
         self.idle
     }
 
-    // Who has a tape asks the family that it was recorded of.
+    // If there is a tape, ask the family of which it was recorded.
     fn parameters(&self) -> Vec<Parameter> {
         Vec::new()
     }

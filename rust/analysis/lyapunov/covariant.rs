@@ -26,7 +26,7 @@ pub struct CovariantFrames<const D: usize> {
     pub covariant: Vec<[[f64; D]; D]>,
 }
 
-/// Follows an orbit from `x0` for `count` intervals of length `dt`. The last `idle` states only fill up the number.
+/// Follows an orbit from `x0` for `count` intervals of length `dt`. `idle` states at the end are padding.
 ///
 /// In each interval the frame is multiplied by the flow's derivative and made orthonormal again, which
 /// leaves a triangular matrix; in a long interval this happens more than once. Run backwards through these, almost any vectors of the spans of the first 1,

@@ -43,7 +43,7 @@ pub struct Lyapunov<'a, F, const D: usize> {
     pub options: LyapunovOptions,
 }
 
-/// What is known of one orbit's exponents.
+/// One orbit's exponents and their accuracy.
 #[derive(Clone, Copy, Debug)]
 pub struct Exponents<const D: usize, const N: usize> {
     pub exponents: Average<N>,
@@ -57,8 +57,8 @@ pub struct Exponents<const D: usize, const N: usize> {
 
 impl<F: Family<D>, const D: usize> Lyapunov<'_, F, D> {
     /// The `N` largest exponents of each orbit: the mean growth rates of tangents that are kept
-    /// orthonormal (Benettin et al., Meccanica 15 (1980) 9). `None` stands for orbits that were not
-    /// finished when the work was stopped.
+    /// orthonormal (Benettin et al., Meccanica 15 (1980) 9). `None` for an orbit that was not finished when the work
+    /// stopped.
     ///
     /// Tangents are the derivative part of a dual run, as accurate as the state. Growth is summed over
     /// blocks, whose scatter gives the standard errors. Where the first half of the blocks disagrees
@@ -151,7 +151,7 @@ impl<F: Family<D>, const D: usize, const N: usize, T: MethodFactory<D>> BatchJob
             let t = batch.driver.t();
             let full = moved.and(t.less(full_at).or(steps.less(R::constant(LEAST_STEPS))).not());
             let over = batch.arrived().or(progress.walled()).or(progress.failed);
-            // What vanishes where a contact sticks is seen at once or never.
+            // A tangent that vanishes when a contact sticks shows at once or never.
             let told = full.or(over).or(progress.switched());
             growth.keep(self.isa, &mut batch.driver, (moved, told));
             for lane in full.or(over).lanes() {

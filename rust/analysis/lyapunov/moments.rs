@@ -34,8 +34,8 @@ pub struct Moments<R, const D: usize> {
     pub time: R,
     /// Of each component.
     pub first: [R; D],
-    /// Of each product of two components; as long as time runs only those with the second one not before
-    /// the first.
+    /// The mean of each product of two components; during the run only those whose second component is not before the
+    /// first.
     pub second: [[R; D]; D],
 }
 

@@ -6,8 +6,8 @@ use crate::model::System;
 use crate::scalar::{Dual, InstructionSet, Isa, Mask, Real, Work};
 use crate::unroll::{unroll, vector};
 
-/// The state with `N` orthonormal tangents that no symmetry singles out. The last `idle` states are apart from the
-/// others: of as many tangents as there are states the last ones are along them.
+/// The state with `N` orthonormal tangents that no symmetry singles out. The padding states at the end are separate
+/// from the others: with as many tangents as states, the last tangents lie along them.
 pub fn tangents<R: Real, const D: usize, const N: usize>(x: [f64; D], idle: usize) -> [Dual<R, N>; D] {
     let mut frame = vector!(Dual<R, N>, D; n => Dual::fixed(R::constant(x[n])));
     for n in 0..D {
@@ -115,8 +115,7 @@ pub struct LogGrowth<R, const N: usize> {
     steps: R,
 }
 
-/// Several tangents are made orthonormal after so many steps: they lean towards each other by no more than
-/// a few digits meanwhile.
+/// The number of steps after which several tangents are made orthonormal again: until then they lose only a few digits.
 const TURN: f64 = 4.0;
 
 impl<R: Real, const N: usize> LogGrowth<R, N> {
@@ -144,8 +143,8 @@ impl<R: Real, const N: usize> LogGrowth<R, N> {
         vector!(f64, N; i => before(i) + log_length(x, i, lane))
     }
 
-    /// Makes the tangents in the lanes that moved orthonormal again, where that has to be, and adds what they
-    /// had grown: several tangents lean towards each other with every step, and have to be orthonormal where
+    /// Makes the tangents in the lanes that moved orthonormal again, if necessary, and adds their growth. Several
+    /// tangents lean towards each other with every step; they must be orthonormal where
     /// asked for in `told`; a single one only must not leave the range of numbers.
     #[inline(always)]
     pub fn keep<M, const D: usize, E, K>(

@@ -59,7 +59,7 @@ impl Form {
     }
 }
 
-/// What a function may ask for beside the time and the state.
+/// The inputs of a function apart from the time and the state.
 pub(super) struct Law<'a, M, R: Real> {
     system: &'a M,
     pub parameters: &'a [R],
@@ -112,7 +112,7 @@ pub struct Scan<'a, R: Real, const D: usize> {
     /// Room for what a lane in doubt crosses, and for what all of them cross that the places do not show.
     brackets: Vec<Bracket>,
     hidden: Vec<(usize, Bracket, bool)>,
-    /// What was found in the last step, with the lane; in the order of time in each of them.
+    /// Crossings of the last step with their lanes, in the order of time in each lane.
     crossed: Vec<(usize, Crossing<D>)>,
     /// How many crossings each lane still leaves out.
     skip: R,
@@ -159,7 +159,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         }
     }
 
-    /// Starts anew in these lanes, to leave out the first `skip` crossings.
+    /// Restarts these lanes, which leave out the first `skip` crossings.
     pub fn begin<F, E, K>(&mut self, batch: &LaneBatch<'_, F, R, D, E, K>, lanes: R::Mask, skip: usize)
     where
         F: Family<D>,
@@ -181,7 +181,7 @@ impl<'a, R: Real, const D: usize> Scan<'a, R, D> {
         }
     }
 
-    /// What the last step crossed, with the lane; in the order of time in each of them.
+    /// The crossings of the last step with their lanes, in the order of time in each lane.
     pub fn crossed(&self) -> &[(usize, Crossing<D>)] {
         &self.crossed
     }

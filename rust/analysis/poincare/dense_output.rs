@@ -107,7 +107,7 @@ impl<R: Real> Work for At<'_, R> {
     }
 }
 
-/// What is looked for: a value, from the places and the sides given on.
+/// The target: a value, from the given places and sides on.
 pub struct Scanned<'a, R: Real> {
     pub less: f64,
     /// The places, as parts of the size.
@@ -137,7 +137,7 @@ impl<R: Real> Work for Signs<'_, R> {
         let mut values = [end; MOST_PROBES];
         let start = self.c[0] - R::constant(less);
         if const { R::LANES == 1 } {
-            // One trajectory: the places side by side, all of them, as vector instructions want it.
+            // One trajectory: all places side by side, as vector instructions need them.
             let places = Packet::<MOST_PROBES, V>::from_lanes(|i| s[i].lane(0));
             let found = value(self.c, places, |c| Packet::new([c.lane(0); MOST_PROBES]));
             // As in `in_doubt`: each value is then large enough for half of the sum with its neighbour.

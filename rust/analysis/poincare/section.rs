@@ -97,7 +97,7 @@ pub struct SectionRun<'a, F, const D: usize> {
 }
 
 impl<F: Family<D>, const D: usize> SectionRun<'_, F, D> {
-    /// Collects them all. `None` stands for trajectories that were not begun when the work was stopped.
+    /// Collects them all. `None` for a trajectory that was not begun when the work stopped.
     pub fn run(&self, context: ExecutionContext<'_>) -> Vec<Option<Crossings<D>>> {
         let (jobs, isa) = (rows::count(self.values, self.starts), context.isa);
         let stages = |queue: &Queue<'_>, results: &mut ResultSink<'_, _>| {
@@ -148,7 +148,7 @@ impl<F: Family<D>, const D: usize, T: MethodFactory<D>> BatchJob for Collect<'_,
             LaneBatch::new(self.isa, family, |values| self.recipe.make(values), start(first), &tolerance);
         let stopped = || queue.stopped();
         let mut scan: Scan<'_, R, D> = Scan::new(sections, self.isa, count, &stopped);
-        // What each lane has found.
+        // The crossings of each lane.
         let mut found_by: Vec<Crossings<D>> = vec![Crossings::new(0); R::LANES];
         for lane in 0..queue.lanes::<R>() {
             let job = if lane == 0 { Some(first) } else { queue.take() };

@@ -40,8 +40,7 @@ pub fn judge<R: Real>(s: &[R], values: &[R], side: Side<R>, stretches: &mut [Str
             crossing = crossing.or(above.and(low).and(moved));
         }
         stretches[i] = Stretch { s: s[i], value, crossing };
-        // A zero leaves the side as it was: a surface that is only touched is not crossed. What is not a
-        // number has no side.
+        // A zero leaves the side as it was: a surface that is only touched is not crossed. NaN has no side.
         let sane = value.finite();
         below = low.or(below.and(high.not())).and(sane);
         above = high.or(above.and(low.not())).and(sane);

@@ -5,14 +5,14 @@ use crate::model::Sides;
 use crate::model::stick_slip::REVERSAL;
 use crate::scalar::Scalar;
 
-/// What dry friction does about its jump at rest.
+/// The treatment of dry friction's jump at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FrictionModel {
-    /// `tanh(Omega/eps)` stands for the sign. Nothing sticks, but it can be fitted.
+    /// `tanh(Omega/eps)` replaces the sign. Nothing sticks, but it can be fitted.
     Smoothed,
     /// The sign itself, any value from -1 to 1 at rest: it sticks, until the torque exceeds the friction.
     SetValued,
-    /// The same, with speeds below `eps` taken for rest (Karnopp, J. Dyn. Sys. Meas. Control 107 (1985) 100).
+    /// The same, with speeds below `eps` treated as rest (Karnopp, J. Dyn. Sys. Meas. Control 107 (1985) 100).
     Karnopp,
     /// Bristles that bend by up to about `eps`, an angle, before they slide (Canudas de Wit, Olsson, Åström &
     /// Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419). Only a [`WithLuGre`](crate::model::WithLuGre)
@@ -36,7 +36,7 @@ impl FrictionModel {
     }
 }
 
-/// What the contact does, beside the speed.
+/// The state of the contact in addition to the speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact<S> {
     /// The direction in which it slides: 1 or -1, 0 where it sticks.
@@ -52,7 +52,7 @@ impl<S: Scalar> Default for Contact<S> {
     }
 }
 
-/// What dry friction adds up to, beside a torque.
+/// The sum of dry friction in addition to a torque.
 #[derive(Clone, Copy, Debug)]
 pub struct Dry<S> {
     /// The largest torque that holds the contact where it is, m^2/s^2.
@@ -101,7 +101,7 @@ impl<S: Scalar> Dry<S> {
     #[inline(always)]
     pub fn bristles(&self, omega: S, deflection: S, inertia: S, sides: &Sides<S>) -> (S, S) {
         let speed = S::select(sides[REVERSAL], omega, -omega);
-        // Without friction there is nothing to bend: the constant only prevents 0/0.
+        // Without friction the constant only prevents 0/0.
         let grip = self.grip + S::constant(f64::MIN_POSITIVE);
         let rate = omega - self.stiffness * speed * deflection / grip;
         let damping = (self.stiffness * inertia + S::constant(f64::MIN_POSITIVE)).sqrt();

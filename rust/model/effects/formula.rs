@@ -4,7 +4,7 @@ use super::{Body, Contributions, EffectInputs, Slot};
 use crate::formula::{Binary, Expression, Leaf, Mistake, Names, Op, Place, Program, Unary, is_reserved};
 use crate::scalar::Scalar;
 
-/// What a formula may look at beside the time: the [`EffectInputs`] by its names. The last two are a pendulum's names
+/// The inputs of a formula in addition to the time: the [`EffectInputs`] by name. The last two are a pendulum's names
 /// of `beta` and `R`.
 const QUANTITIES: [&str; 12] =
     ["Omega", "speed", "Y", "Z", "beta", "k", "inertia", "W", "g", "R", "theta", "length"];
@@ -109,7 +109,7 @@ impl Formula {
         &self.parameters
     }
 
-    /// What it can act on.
+    /// The bodies that it can act on.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }

@@ -7,7 +7,7 @@ use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scala
 /// weight.
 pub struct LoadCoulomb;
 
-/// Of the weight: where the load changes sign, its size is rounded off within this.
+/// A share of the weight: within it the size of the load is rounded off at a change of sign.
 const ROUND: f64 = 1e-3;
 
 impl EffectLaw for LoadCoulomb {

@@ -39,7 +39,7 @@ pub use term::{Effect, Source, Term};
 
 use crate::scalar::Scalar;
 
-/// What an effect may look at: the state and the plain model's quantities.
+/// The inputs of an effect: the state and the plain model's quantities.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectInputs<S> {
     /// Time, s.
@@ -64,7 +64,7 @@ pub struct EffectInputs<S> {
     pub g: S,
     /// Disk radius (a pendulum's length), m.
     pub radius: S,
-    /// What dry friction's contact does.
+    /// The state of dry friction's contact.
     pub contact: Contact<S>,
 }
 
@@ -91,7 +91,7 @@ pub struct Contributions<S> {
     pub vertical: S,
     /// How the effect that enters treats dry friction.
     pub treatment: FrictionModel,
-    /// What dry friction does beside its torque.
+    /// The part of dry friction that is no torque.
     pub dry: Dry<S>,
 }
 
@@ -128,7 +128,7 @@ impl Slot {
     }
 }
 
-/// What an effect acts on.
+/// The bodies that an effect acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Body {
     Disk,
@@ -164,7 +164,7 @@ impl Momentum {
     }
 }
 
-/// What a parameter does in its formula, and so how a fit treats it.
+/// The role of a parameter in its formula, and so in a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Role {
     /// The effect is proportional to it and absent where all amplitudes are zero.
@@ -195,22 +195,22 @@ impl EffectParameter {
         Self { name, unit, default, range: (f64::NEG_INFINITY, f64::INFINITY), role }
     }
 
-    /// What the effect is proportional to; zero by default, and of any size and sign.
+    /// A factor of the effect; zero by default, of any size and sign.
     pub const fn amplitude(name: &'static str, unit: &'static str) -> Self {
         Self::new(name, unit, 0.0, Role::Amplitude)
     }
 
-    /// What shapes the formula, with the value taken by default and those that a scan tries.
+    /// A shape of the formula, with its default and the values that a scan tries.
     pub const fn shape(name: &'static str, unit: &'static str, default: f64, tried: &'static [f64]) -> Self {
         Self::new(name, unit, default, Role::Shape(tried))
     }
 
-    /// A frequency, with the value taken by default.
+    /// A frequency, with its default.
     pub const fn frequency(name: &'static str, unit: &'static str, default: f64) -> Self {
         Self::new(name, unit, default, Role::Frequency)
     }
 
-    /// A number that a scan searches, with what it is and the value taken by default.
+    /// A number that a scan searches, with its meaning and its default.
     pub const fn scanned(name: &'static str, unit: &'static str, default: f64, what: &'static str) -> Self {
         Self::new(name, unit, default, Role::Scanned(what))
     }
@@ -222,7 +222,7 @@ impl EffectParameter {
     }
 }
 
-/// What is said of an effect beside its formula.
+/// The description of an effect in addition to its formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spec {
     /// The name used in code: `udd.effects.<name>`.
@@ -231,7 +231,7 @@ pub struct Spec {
     pub title: &'static str,
     /// The formula as a reader writes it.
     pub equation: &'static str,
-    /// What it would mean physically, in a sentence.
+    /// Its physical meaning, in a sentence.
     pub meaning: &'static str,
     /// The bodies that it can act on.
     pub bodies: &'static [Body],
@@ -276,7 +276,7 @@ macro_rules! library {
             /// Every effect in the library.
             pub const ALL: &[Kind] = &[$(Kind::$Name),+];
 
-            /// What is said of it beside its formula.
+            /// Its description in addition to its formula.
             pub fn spec(self) -> &'static Spec {
                 match self { $(Kind::$Name => &$Name::SPEC),+ }
             }

@@ -67,7 +67,7 @@ impl Effect {
         }
     }
 
-    /// What it can act on.
+    /// The bodies that it can act on.
     pub fn bodies(&self) -> &[Body] {
         match &self.source {
             Source::Library(kind) => kind.spec().bodies,

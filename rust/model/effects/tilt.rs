@@ -2,7 +2,7 @@ use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scala
 
 /// Gravity and drive that are not parallel: an angle `a` between them.
 ///
-/// A picture's own tilt is the camera's and is fitted beside it, so a tilted gravity and a tilted drive
+/// The tilt of the picture belongs to the camera and is fitted separately, so a tilted gravity and a tilted drive
 /// are one and the same: the world turned by `a`.
 pub struct Tilt;
 

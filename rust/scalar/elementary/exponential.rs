@@ -35,7 +35,7 @@ pub(super) fn split<R: Real>(x: R) -> (R, R, R) {
 /// The exponential function, within 1 ulp; denormal results too.
 #[inline(always)]
 pub fn exp<R: Real>(x: R) -> R {
-    // Beyond these the result is infinite or zero. What is not a number stays so.
+    // Beyond these the result is infinite or zero. NaN stays NaN.
     let x = R::constant(710.0).min(R::constant(-746.0).max(x));
     let (k, a, b) = split(x);
     // 2^k itself may be too large or too small for a number; only the last product is rounded.
