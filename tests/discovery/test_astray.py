@@ -38,61 +38,63 @@ def noisy(model: udd.Model, start: list[float], share: float) -> udd.Measurement
 
 def test_a_form_is_found_whose_score_ranks_below_those_of_others_like_it() -> None:
     """Around a laser model without its inversion's decay eight other products score higher than x*y."""
-    known = {"x": "a*(y - x)", "y": "b*(x*z - y)", "z": "c - d*z"}
+    baseline = {"x": "a*(y - x)", "y": "b*(x*z - y)", "z": "c - d*z"}
     values = {"a": 0.1, "b": 0.21, "c": 0.34 * 4.1, "d": 0.34}
-    truth = udd.Model(list("xyz"), known | {"z": known["z"] + " - k*x*y"}, values | {"k": 1.054})
-    found = udd.discover(noisy(truth, [1.3, 1.1, 0.89], 0.01), udd.Model(list("xyz"), known, values))
-    names = [s.candidate.effect.name for s in found.scans[0]]
+    truth = udd.Model(list("xyz"), baseline | {"z": baseline["z"] + " - k*x*y"}, values | {"k": 1.054})
+    result = udd.discover(noisy(truth, [1.3, 1.1, 0.89], 0.01), udd.Model(list("xyz"), baseline, values))
+    names = [s.candidate.effect.name for s in result.scans[0]]
     assert names.index("x_y_in_z") > 6
-    assert [f.effect.name for f in found.effects] == ["x_y_in_z"]
-    assert abs(found.fit.parameters["x_y_in_z.c1"] + 1.054) < 4 * found.fit.errors["x_y_in_z.c1"]
+    assert [f.effect.name for f in result.effects] == ["x_y_in_z"]
+    assert abs(result.fit.parameters["x_y_in_z.c1"] + 1.054) < 4 * result.fit.errors["x_y_in_z.c1"]
 
 
 def test_what_does_nearly_the_same_along_a_motion_is_listed_whatever_its_score() -> None:
     """Lorenz' equations near rest, where z hardly changes: x*z^2 does what x*z does."""
-    known = udd.Model(list("xyz"), {"x": "10*(y - x)", "y": "14*x - y", "z": "x*y - b*z"}, {"b": 8.0 / 3.0})
-    wrong = known.with_effects([udd.effects.formula("y'", "c*x*z^2", c=-0.07)])
+    baseline = udd.Model(
+        list("xyz"), {"x": "10*(y - x)", "y": "14*x - y", "z": "x*y - b*z"}, {"b": 8.0 / 3.0}
+    )
+    wrong = baseline.with_effects([udd.effects.formula("y'", "c*x*z^2", c=-0.07)])
     t = np.linspace(0.0, 10.0, 512)
     run = udd.simulate(wrong, t, [6.0, 6.3, 13.5]).state  # around rest, where z is 13
     fitted = udd.fit(udd.Measurement(t, dict(zip("xyz", run.T, strict=True))), wrong)
-    found = look_alikes(known, fitted, library(known))
-    names = [candidate.effect.name for candidate, _amplitude in found]
+    result = look_alikes(baseline, fitted, library(baseline))
+    names = [candidate.effect.name for candidate, _amplitude in result]
     at = names.index("x_z_in_y")
     assert 0 <= at < 4
-    assert abs(found[at][1] + 0.07 * fitted.states[:, 2].mean()) < 0.02
+    assert abs(result[at][1] + 0.07 * fitted.states[:, 2].mean()) < 0.02
     assert "y_in_z" not in names
 
 
 def test_all_data_are_fitted_from_where_the_fit_of_the_first_part_ended() -> None:
     """Fitted to all data the known model loses turns, and from there no better one finds back."""
-    known = {"x": "k + sin(y)*cos(x)", "y": "sin(y)*cos(x)"}
+    baseline = {"x": "k + sin(y)*cos(x)", "y": "sin(y)*cos(x)"}
     values = {"k": 1.53}
-    truth = udd.Model(["x", "y"], known | {"y": "m + " + known["y"]}, {"k": 1.432, "m": 0.972})
-    model = udd.Model(["x", "y"], known, values, angles=["x", "y"])
-    found = udd.discover(noisy(truth, [2.2, 0.67], 0.02), model)
+    truth = udd.Model(["x", "y"], baseline | {"y": "m + " + baseline["y"]}, {"k": 1.432, "m": 0.972})
+    model = udd.Model(["x", "y"], baseline, values, angles=["x", "y"])
+    result = udd.discover(noisy(truth, [2.2, 0.67], 0.02), model)
     # A dry friction of x', which never turns, would be a constant too.
     titles = {"1 in y'", "dry friction of x' in y'"}
-    assert {f.title for f in found.effects} | {a.title for a in found.alternatives} == titles
-    assert found.fit.scatter < 1.2
+    assert {f.title for f in result.effects} | {a.title for a in result.alternatives} == titles
+    assert result.fit.scatter < 1.2
 
 
 def test_parameters_that_the_data_do_not_determine_are_held_near_what_was_stated() -> None:
     """Two constants that stand only in a product, and a drag that is missing."""
     t = np.arange(0.0, 40.0, 0.05)
-    known = {"q": "w", "w": "-a*b*sin(q) - g*w"}
+    baseline = {"q": "w", "w": "-a*b*sin(q) - g*w"}
     truth = udd.Model(
-        ["q", "w"], known | {"w": known["w"] + " - 0.05*abs(w)*w"}, {"a": 2.0, "b": 3.0, "g": 0.02}
+        ["q", "w"], baseline | {"w": baseline["w"] + " - 0.05*abs(w)*w"}, {"a": 2.0, "b": 3.0, "g": 0.02}
     )
     run = udd.simulate(truth, t, [1.2, 0.0]).state[:, 0]
     measured = udd.Measurement(t, {"q": run + 2e-3 * np.random.default_rng(1).standard_normal(len(t))})
-    stated = udd.Model(["q", "w"], known, {"a": 2.2, "b": 2.8, "g": 0.05}, angles=["q"])
-    found = udd.discover(measured, stated)
-    assert [f.effect.name for f in found.effects] == ["abs_w_w_in_w"]
-    assert found.undetermined == ("a", "b")
-    assert any("do not determine a, b" in said for said in found.remarks)
-    values = found.fit.parameters
+    stated = udd.Model(["q", "w"], baseline, {"a": 2.2, "b": 2.8, "g": 0.05}, angles=["q"])
+    result = udd.discover(measured, stated)
+    assert [f.effect.name for f in result.effects] == ["abs_w_w_in_w"]
+    assert result.undetermined == ("a", "b")
+    assert any("do not determine a, b" in said for said in result.remarks)
+    values = result.fit.parameters
     assert abs(values["a"] * values["b"] - 6.0) < 0.02  # their product is
-    assert found.fit.errors["a"] > 0.3 * values["a"]
+    assert result.fit.errors["a"] > 0.3 * values["a"]
 
 
 def filmed(truth: udd.Disk, seconds: float) -> udd.Measurement:
@@ -143,12 +145,14 @@ def test_a_curve_leads_where_the_library_has_no_law_like_it(law: unmodelled.Law,
 
 def test_what_leads_is_located_before_the_library_is_fitted() -> None:
     (waves,) = (case for case in unmodelled.CASES if case.name == "five waves")
-    told: list[str] = []
-    found = udd.discover(
-        unmodelled.record(stronger(waves.law), 1, 40.0), udd.Disk(0.045), progress=told.append
+    reported: list[str] = []
+    result = udd.discover(
+        unmodelled.record(stronger(waves.law), 1, 40.0), udd.Disk(0.045), progress=reported.append
     )
-    assert next(line for line in told if line.startswith("trying")) == "trying torque as a function of beta"
-    (effect,) = found.effects
+    assert (
+        next(line for line in reported if line.startswith("trying")) == "trying torque as a function of beta"
+    )
+    (effect,) = result.effects
     assert effect.title == "torque = a * sin(5 * beta)"
     assert effect.effect.parameters["a"] == pytest.approx(0.06, rel=0.02)
 
@@ -159,9 +163,9 @@ def test_what_dies_down_slowly_is_scored_where_it_is_held_tightly() -> None:
     t = np.arange(0.0, 120.0, 0.05)
     theta = udd.simulate(truth, t, [0.0, 0.8]).state[:, 1]
     read = theta + 2.5e-3 * np.random.default_rng(1).standard_normal(len(t))
-    known = udd.Pendulum(0.65, k0=0.004)
+    baseline = udd.Pendulum(0.65, k0=0.004)
     measured = udd.Measurement(t, {"theta": read})
-    fitted = fit_record(measured, record_of(measured), known, search=True)
+    fitted = fit_record(measured, record_of(measured), baseline, search=True)
     assert fitted.scatter > 3.0
     scores = score_round(fitted)
     assert scores.fit is fitted
@@ -190,18 +194,18 @@ def test_fits_of_a_narrow_bump_show_its_momentum(momentum: str) -> None:
 @pytest.mark.nightly  # test_fits_of_a_narrow_bump_show_its_momentum asks the same of the fits
 @pytest.mark.parametrize("momentum", ["consistent", "constraint"])
 def test_a_narrow_bump_is_told_with_its_momentum_or_without(momentum: str) -> None:
-    found = udd.discover(filmed(udd.Disk(0.03, effects=[bump(momentum)]), 30.0), udd.Disk(0.03))
-    (effect,) = found.effects
+    result = udd.discover(filmed(udd.Disk(0.03, effects=[bump(momentum)]), 30.0), udd.Disk(0.03))
+    (effect,) = result.effects
     assert effect.title == f"lateral ({momentum}) = a * exp((-1) * (b * (c + Y))^2)"
-    assert found.verdict == "effect identified"
+    assert result.verdict == "effect identified"
 
 
 def test_a_fit_goes_on_from_another_with_as_much_free() -> None:
     measured = filmed(udd.Disk(0.07), 20.0)
-    held = fit_record(measured, record_of(measured), udd.Disk(0.07), ["k0"], camera=False, search=True)
+    fixed = fit_record(measured, record_of(measured), udd.Disk(0.07), ["k0"], camera=False, search=True)
     all_free = udd.fit(measured, udd.Disk(0.07)).problem.free
-    more = extend(released(held, all_free), [udd.effects.constant_torque()], [0.0])
-    back = started_at(held, more)
+    more = extend(released(fixed, all_free), [udd.effects.constant_torque()], [0.0])
+    back = started_at(fixed, more)
     assert {f.name for f in back.problem.free} == set(more.parameters) - {"constant_torque.c"}
     assert reduce_model_error(back.measurements, back.problem, back.point, back.problem.schedule).converged
 
@@ -231,9 +235,9 @@ def test_where_misfits_show_the_models_faults_no_noise_is_sought_at_tighter_leve
     estimate = module._estimate_noise
 
     def watched(*given: object) -> object:
-        found = estimate(*given)
-        asked.append(found[0])
-        return found
+        result = estimate(*given)
+        asked.append(result[0])
+        return result
 
     monkeypatch.setattr(module, "_estimate_noise", watched)
     again = fit_record(astray.measurements, astray.record, astray.models, ["k0"], camera=False, search=True)
@@ -243,11 +247,11 @@ def test_where_misfits_show_the_models_faults_no_noise_is_sought_at_tighter_leve
 
 def test_once_a_strong_effect_is_found_the_noise_is_estimated_anew(astray: Fit) -> None:
     """Around the known model it could not be told from what the model misses, and was taken as stated."""
-    found = extend(astray, [udd.effects.load_drive(a=1.8)], [1.8])
+    result = extend(astray, [udd.effects.load_drive(a=1.8)], [1.8])
     free = fit_record(
         astray.measurements, astray.record, astray.models, ["k0", "W"], camera=False, search=True
     )
-    kept, anew = (work(found, free.problem.free) for work in (released, released_anew))
+    kept, anew = (work(result, free.problem.free) for work in (released, released_anew))
     assert abs(anew.parameters["W"] - 0.08) < 4 * anew.errors["W"]
     assert kept.scatter > 1.5
     assert 0.9 < anew.scatter < 1.1

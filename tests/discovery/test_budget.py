@@ -15,22 +15,22 @@ from udd.report import as_text, summary_of
 
 def test_a_search_without_time_says_so_and_claims_nothing(tmp_path):
     said: list[str] = []
-    found = udd.discover(*in_air(), budget=1e-6, progress=said.append)
-    assert found.effects == [] and found.scans == []
-    assert found.stopped == "scoring candidates" and found.to_dict()["stopped"] == found.stopped
-    assert found.verdict != "nothing missing"
-    assert "The search ended after 1e-06 s, as asked" in as_text(summary_of(found)).splitlines()[0]
+    result = udd.discover(*in_air(), budget=1e-6, progress=said.append)
+    assert result.effects == [] and result.scans == []
+    assert result.stopped == "scoring candidates" and result.to_dict()["stopped"] == result.stopped
+    assert result.verdict != "nothing missing"
+    assert "The search ended after 1e-06 s, as asked" in as_text(summary_of(result)).splitlines()[0]
     assert said == ["fitting the known model", "fitting the model as found"]
-    found.report(tmp_path / "page.html")
+    result.report(tmp_path / "page.html")
     assert "as asked" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_a_search_whose_model_explains_its_data_is_not_finished_without_time():
     measured, model = in_air()
     right = model.with_effects([udd.effects.quadratic_drag(c=0.02)])
-    found = udd.discover(measured, right, budget=1e-6)
-    assert found.verdict == "search not finished"
-    assert as_text(summary_of(found)).startswith(
+    result = udd.discover(measured, right, budget=1e-6)
+    assert result.verdict == "search not finished"
+    assert as_text(summary_of(result)).startswith(
         "search not finished: Whether something is missing is not known yet"
     )
 
@@ -44,11 +44,11 @@ def test_what_passed_before_the_time_was_up_stands(monkeypatch):
         plain(self, text)
 
     monkeypatch.setattr(time_budget.Clock, "tell", tell)
-    measured, known = in_air()
-    found = udd.discover(measured.slice(0, 20), known, budget=100.0)
-    assert [f.title for f in found.effects] == ["quadratic drag"]
-    assert found.stopped == "scoring candidates for a further effect"
-    assert "what else may be missing was not tried" in as_text(summary_of(found)).splitlines()[0]
+    measured, baseline = in_air()
+    result = udd.discover(measured.slice(0, 20), baseline, budget=100.0)
+    assert [f.title for f in result.effects] == ["quadratic drag"]
+    assert result.stopped == "scoring candidates for a further effect"
+    assert "what else may be missing was not tried" in as_text(summary_of(result)).splitlines()[0]
 
 
 @pytest.mark.parametrize("budget", [0.0, -1.0, "soon", float("nan")])
@@ -69,9 +69,9 @@ def swing(rate: float, noise: float) -> tuple[udd.Measurement, np.ndarray]:
 
 def test_block_averages_keep_what_a_record_says():
     measured, theta = swing(1000.0, 5e-3)
-    found = thinned(measured)
-    few = found.measurement
-    assert (found.frames, found.every) == (29500, 8)
+    result = thinned(measured)
+    few = result.measurement
+    assert (result.frames, result.every) == (29500, 8)
     assert len(few) < 4000
     assert few.t[0] == measured.t[0] and not few.seen[0]  # from where the model's time counts
     few = few.rows(np.flatnonzero(few.seen))
@@ -95,11 +95,11 @@ def test_a_motion_that_dies_down_below_its_noise_is_averaged():
     t = np.arange(0, 156, 0.01)
     theta = 2.0 * np.exp(-t / 4) * np.cos(7 * t)
     noise = 0.01 * np.random.default_rng(0).standard_normal(len(t))
-    found = thinned(udd.Measurement(t, {"theta": theta + noise}))
-    assert found.every >= 3
-    few = found.measurement.rows(np.flatnonzero(found.measurement.seen))
+    result = thinned(udd.Measurement(t, {"theta": theta + noise}))
+    assert result.every >= 3
+    few = result.measurement.rows(np.flatnonzero(result.measurement.seen))
     off = few["theta"] - np.interp(few.t, t, theta)
-    assert np.sqrt((off**2).mean()) == pytest.approx(0.01 * np.sqrt(1.18 / found.every), rel=0.1)
+    assert np.sqrt((off**2).mean()) == pytest.approx(0.01 * np.sqrt(1.18 / result.every), rel=0.1)
     # As the pull of a brake that bends the motion within a few frames is at its start.
     fast = udd.Measurement(t, {"theta": 2.0 * np.exp(-t / 4) * np.cos(150 * t) + noise})
     assert thinned(fast).every == 1
@@ -113,9 +113,9 @@ def test_frames_with_a_lost_column_are_left_out_of_the_averages():
     seen = np.stack([np.cos(3 * t), np.sin(3 * t)], axis=-1) + 3e-3 * rng.standard_normal((len(t), 2))
     gone = rng.choice(len(t), 200, replace=False)
     seen[gone, 1] = np.nan
-    found = thinned(udd.Measurement(t, seen, names=("a", "b")))
-    assert (found.every, found.frames) == (4, len(t))
-    assert np.isfinite(found.measurement.values[1:]).all()
+    result = thinned(udd.Measurement(t, seen, names=("a", "b")))
+    assert (result.every, result.frames) == (4, len(t))
+    assert np.isfinite(result.measurement.values[1:]).all()
 
 
 def test_a_discovery_says_what_was_averaged():
@@ -124,18 +124,18 @@ def test_a_discovery_says_what_was_averaged():
     theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
     noise = 5e-3 * np.random.default_rng(3).standard_normal(len(t))
     record = udd.Measurement(t, {"theta": theta + noise})
-    found = udd.discover(record, udd.Pendulum(0.6, k0=0.01), budget=1e-6)  # said whatever is found
-    assert "The record's 20000 frames were averaged in blocks of 5, to 3998" in found.remarks[-1]
+    result = udd.discover(record, udd.Pendulum(0.6, k0=0.01), budget=1e-6)  # said whatever is found
+    assert "The record's 20000 frames were averaged in blocks of 5, to 3998" in result.remarks[-1]
 
 
 def test_a_fall_of_a_second_shows_the_air():
     t = np.arange(60) / 60
     truth = udd.Model(["x", "v"], ["v", "g - c*abs(v)*v"], {"g": 9.81, "c": 0.3})
     x = udd.simulate(truth, t, [0.0, 0.0]).state[:, 0]
-    known = udd.Model(["x", "v"], ["v", "g"], {"g": 9.81})
+    baseline = udd.Model(["x", "v"], ["v", "g"], {"g": 9.81})
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
     for n, verdict in ((60, "effect identified"), (30, "effect present, form not identified")):
-        found = udd.discover(udd.Measurement(t[:n], {"x": (x + noise)[:n]}), known)
-        assert found.verdict == verdict
-    still = udd.simulate(known, t, [0.0, 0.0]).state[:, 0]
-    assert udd.discover(udd.Measurement(t, {"x": still + noise}), known).verdict == "nothing missing"
+        result = udd.discover(udd.Measurement(t[:n], {"x": (x + noise)[:n]}), baseline)
+        assert result.verdict == verdict
+    still = udd.simulate(baseline, t, [0.0, 0.0]).state[:, 0]
+    assert udd.discover(udd.Measurement(t, {"x": still + noise}), baseline).verdict == "nothing missing"

@@ -37,24 +37,24 @@ def records(drags: list[float], seed: int = 0) -> list[udd.Measurement]:
 
 def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp_path: Path) -> None:
     given = records([0.08, 0.08, 0.08, 0.08])
-    found = udd.discover(given, oscillator(), held_out=[1])
-    assert found.verdict == "effect identified" and found.held_out == (1,)
-    (effect,) = found.effects
+    result = udd.discover(given, oscillator(), held_out=[1])
+    assert result.verdict == "effect identified" and result.held_out == (1,)
+    (effect,) = result.effects
     assert effect.title == "abs(v)*v in v'" and effect.witness == "held"
     assert [a.record for a in effect.by_record] == [0, 2, 3]
     for answer in effect.by_record:
         (value,), (error,) = answer.parameters.values(), answer.errors.values()
         assert answer.answer == "wants it" and abs(value + 0.08) < 4 * error
-    assert found.remarks[0] == "abs(v)*v in v': significant in 3 of 3 records."
+    assert result.remarks[0] == "abs(v)*v in v': significant in 3 of 3 records."
     # The record held out is in no fit: neither its frames nor what it lowers.
-    assert set(found.fit.record.film.tolist()) == set(found.baseline.record.film.tolist()) == {0, 1, 2}
-    np.testing.assert_array_equal(found.fit.measurements[3]["x"], given[1]["x"])
-    assert found.ratio[2] < 0.5
-    udd.save(found, tmp_path / "found.npz")
+    assert set(result.fit.record.film.tolist()) == set(result.baseline.record.film.tolist()) == {0, 1, 2}
+    np.testing.assert_array_equal(result.fit.measurements[3]["x"], given[1]["x"])
+    assert result.ratio[2] < 0.5
+    udd.save(result, tmp_path / "found.npz")
     again = udd.load(tmp_path / "found.npz")
     assert isinstance(again, udd.Discovery)
-    assert again.by_record == found.by_record and again.held_out == (1,)
-    found.report(tmp_path / "page.html")
+    assert again.by_record == result.by_record and again.held_out == (1,)
+    result.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.index("Supported by all records: abs(v)*v in v") < page.index("<img")
     assert "Whole records, by number 1, were held back." in page
@@ -62,12 +62,12 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
 
 @pytest.mark.nightly
 def test_what_only_one_record_wants_is_told_apart() -> None:
-    found = udd.discover(records([0.0, 0.12, 0.0]), oscillator())
-    assert found.verdict == "effect present, form not identified" and not found.effects
-    nearest = found.rejected[0]
+    result = udd.discover(records([0.0, 0.12, 0.0]), oscillator())
+    assert result.verdict == "effect present, form not identified" and not result.effects
+    nearest = result.rejected[0]
     assert nearest.title == "abs(v)*v in v'" and nearest.why == "records"
     assert [a.answer for a in nearest.by_record] == ["does not want it", "wants it", "does not want it"]
-    assert found.remarks[0] == "abs(v)*v in v': only record 1 wants it."
+    assert result.remarks[0] == "abs(v)*v in v': only record 1 wants it."
 
 
 @pytest.mark.parametrize(
@@ -79,9 +79,9 @@ def test_what_only_one_record_wants_is_told_apart() -> None:
 )
 def test_each_record_has_its_own_amplitude(drags: list[float], expected: list[str]) -> None:
     given, model = records(drags), oscillator()
-    known = fit_record(given, record_of(given, model), model, search=True)
+    baseline = fit_record(given, record_of(given, model), model, search=True)
     drag = udd.effects.formula("v'", "-c*abs(v)*v", name="drag", c=0.0)
-    answers, _chi2 = by_record(known, extend(known, [drag], [0.0]), drag, [5, 6, 7])
+    answers, _chi2 = by_record(baseline, extend(baseline, [drag], [0.0]), drag, [5, 6, 7])
     assert [a.answer for a in answers] == expected and [a.record for a in answers] == [5, 6, 7]
     for answer, truth in zip(answers, drags, strict=True):
         assert abs(answer.parameters["c"] - truth) < 4 * answer.errors["c"]
@@ -90,13 +90,13 @@ def test_each_record_has_its_own_amplitude(drags: list[float], expected: list[st
 
 @pytest.mark.parametrize("held_out", [None, [2]])
 def test_nothing_is_found_where_nothing_is_missing(held_out: list[int] | None) -> None:
-    found = udd.discover(records([0.0, 0.0, 0.0], seed=3), oscillator(), held_out=held_out)
-    assert found.verdict == "nothing missing" and not found.effects
+    result = udd.discover(records([0.0, 0.0, 0.0], seed=3), oscillator(), held_out=held_out)
+    assert result.verdict == "nothing missing" and not result.effects
 
 
 def test_the_sentences() -> None:
     def answers(*said: Any) -> list[RecordAnswer]:
-        return [RecordAnswer(k, one, {}, {}) for k, one in enumerate(said)]
+        return [RecordAnswer(k, item, {}, {}) for k, item in enumerate(said)]
 
     wants, not_, silent = "wants it", "does not want it", "cannot tell"
     assert sentence("drag", answers(wants, silent, wants)) == (

@@ -27,19 +27,19 @@ from udd.report import as_text, summary_of, wording
 
 def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path):
     monkeypatch.setattr(Acceptance, "improvement", lambda *_: (0.9, 0.8, 1.02))
-    found = udd.discover(*in_air())
-    assert found.verdict == "fits the first part, not confirmed"
-    assert found.effects == [] and found.model.effects == ()
-    assert [(near.title, near.why) for near in found.rejected] == [("quadratic drag", "unconfirmed")]
-    first = as_text(summary_of(found)).splitlines()[0]
+    result = udd.discover(*in_air())
+    assert result.verdict == "fits the first part, not confirmed"
+    assert result.effects == [] and result.model.effects == ()
+    assert [(close.title, close.why) for close in result.rejected] == [("quadratic drag", "unconfirmed")]
+    first = as_text(summary_of(result)).splitlines()[0]
     assert first.startswith(
         "fits the first part, not confirmed: Not confirmed: quadratic drag fits the first"
     )
-    found.report(tmp_path / "page.html")
+    result.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<h1>Not confirmed: quadratic drag fits the first part" in page
     assert "<strong>fits the first part, not confirmed</strong>" in page
-    assert json.loads(json.dumps(found.to_dict(), default=str))["refused"][0]["why"] == "unconfirmed"
+    assert json.loads(json.dumps(result.to_dict(), default=str))["refused"][0]["why"] == "unconfirmed"
 
 
 @pytest.mark.parametrize(
@@ -53,12 +53,12 @@ def test_what_free_runs_do_not_confirm_is_no_finding(monkeypatch, tmp_path: Path
 )
 def test_only_steps_that_free_runs_confirm_are_kept(monkeypatch, ratio, steps):
     """A search's fits before and after its one step, with its own ratio of errors and with others."""
-    found = discovered.pendulum()
-    record = found.fit.record
+    result = discovered.pendulum()
+    record = result.fit.record
     tests = Acceptance(record, ~record.first(TRAIN), Clock(None, lambda _text: None))
     states = [
-        SearchState(found.baseline, found.baseline, found.error_before),
-        SearchState(found.trained, found.fit, found.error_after),
+        SearchState(result.baseline, result.baseline, result.error_before),
+        SearchState(result.trained, result.fit, result.error_after),
     ]
     if ratio is not None:
         monkeypatch.setattr(Acceptance, "improvement", lambda *_: ratio)
@@ -67,18 +67,18 @@ def test_only_steps_that_free_runs_confirm_are_kept(monkeypatch, ratio, steps):
 
 @pytest.mark.parametrize("witness", [None, "held"])
 def test_a_trial_that_held_out_frames_do_not_confirm_is_not_accepted(monkeypatch, witness):
-    measured, known = in_air()
+    measured, baseline = in_air()
     record = record_of(measured)
     train = record.first(TRAIN)
-    part, whole = (fit_record(measured, some, known, search=True) for some in (record.part(train), record))
+    part, whole = (fit_record(measured, some, baseline, search=True) for some in (record.part(train), record))
     scores = score_round(part)
     (drag,) = (s for s in scores.library.scored if s.candidate.title == "quadratic drag")
     trials = fitted_ones([of_library(part, [drag.candidate], list(drag.amplitudes))])
     tests = Acceptance(record, ~train, Clock(None, lambda _text: None))
     monkeypatch.setattr("udd.discovery.acceptance.confirmed_by", lambda *_: ((0.9, 0.8, 1.02), witness))
-    found = tests.best(SearchState(part, whole, tests.errors(part)), trials, scores)
-    assert (found is not None) == (witness is not None)
-    assert found is None or found[0].witness == witness
+    result = tests.best(SearchState(part, whole, tests.errors(part)), trials, scores)
+    assert (result is not None) == (witness is not None)
+    assert result is None or result[0].witness == witness
 
 
 def test_an_interval_that_reaches_one_confirms_only_where_noise_hides_the_gain():
@@ -94,14 +94,14 @@ def test_an_interval_that_reaches_one_confirms_only_where_noise_hides_the_gain()
 
 
 def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
-    found = discovered.pendulum()
-    record = record_of(found.measurement)
-    held = ~record.first(0.6)
-    assert not misses_the_motion(found.error_before, record, held)
-    lost = replace(found.error_before, run=np.full(held.sum(), 1.5))
-    assert misses_the_motion(lost, record, held)
+    result = discovered.pendulum()
+    record = record_of(result.measurement)
+    fixed = ~record.first(0.6)
+    assert not misses_the_motion(result.error_before, record, fixed)
+    lost = replace(result.error_before, run=np.full(fixed.sum(), 1.5))
+    assert misses_the_motion(lost, record, fixed)
     noisy = replace(lost, floor=np.full(len(lost.floor), 1.0))  # nothing can be told there
-    assert not misses_the_motion(noisy, record, held)
+    assert not misses_the_motion(noisy, record, fixed)
     disk = discovered.nothing()
     assert not misses_the_motion(disk.error_before, disk.fit.record, ~disk.fit.record.first(0.6))
     # Nothing of the library passes, but the model loses the motion.
@@ -110,7 +110,7 @@ def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
     monkeypatch.setattr("udd.discovery.acceptance.ALPHA", 0.0)
     monkeypatch.setattr("udd.discovery.score_rounds.ALPHA", 0.0)
     monkeypatch.setattr(held_out_errors, "_LOST", 0.0)
-    measured, known = in_air()
-    said = udd.discover(measured.slice(0, 20), known)
+    measured, baseline = in_air()
+    said = udd.discover(measured.slice(0, 20), baseline)
     assert not said.effects and said.verdict == "effect present, form not identified"
     assert wording.verdict(said).startswith("The model lacks something")

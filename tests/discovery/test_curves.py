@@ -43,12 +43,12 @@ def null() -> udd.Fit:
 @pytest.mark.parametrize("case", unmodelled.CASES, ids=lambda case: case.name)
 def test_a_law_of_no_library_is_located_and_described(case):
     fit = udd.fit(unmodelled.record(weak(case), 5), udd.Disk(W))
-    found = scan_curves(fit)
-    best = found.curves[0]
+    result = scan_curves(fit)
+    best = result.curves[0]
     assert best.name in case.found
-    assert found.p < 1e-4  # a tenth of what a search takes to accept it
+    assert result.p < 1e-4  # a tenth of what a search takes to accept it
     # Friction over the speed has an infinite slope at rest, where it does nothing; its torque is smooth.
-    curve = identifiable_part(refined(next(c for c in found.curves if c.name == case.found[0]), fit), fit)
+    curve = identifiable_part(refined(next(c for c in result.curves if c.name == case.found[0]), fit), fit)
     described = formulas_for(curve, int(np.isfinite(fit.misfit).sum()))
     assert described.identified
     # Some formula within the ten nats is the law, as closely as the curve is known where the data are.
@@ -82,25 +82,25 @@ def test_the_load_is_the_same_in_formulas_and_for_each_film():
     x = np.random.default_rng(4).normal(0.0, [4.0, 0.02, 0.02, 3.0], (20, 4))
     for w in (0.02, 0.06):
         plain = udd.Disk(w)
-        one = coordinate(plain, "load")
-        known = [unmodelled.load(o, y, z, w) for o, y, z, _ in x]
-        np.testing.assert_allclose(one.of(np.zeros(20), x), known, rtol=1e-12)
+        item = coordinate(plain, "load")
+        baseline = [unmodelled.load(o, y, z, w) for o, y, z, _ in x]
+        np.testing.assert_allclose(item.of(np.zeros(20), x), baseline, rtol=1e-12)
         rates = plain.rates(0.0, x)
-        effect = E.formula("friction", f"a * ({one.text})", a=1e-3)
+        effect = E.formula("friction", f"a * ({item.text})", a=1e-3)
         (friction,) = (s for s in slots(plain) if s.title == "friction")
-        made = friction.forcing(plain, x, 1e-3 * one.of(np.zeros(20), x), np.zeros(20))
+        made = friction.forcing(plain, x, 1e-3 * item.of(np.zeros(20), x), np.zeros(20))
         np.testing.assert_allclose(plain.with_effects([effect]).rates(0.0, x) - rates, made, atol=1e-9)
 
 
 def test_films_at_two_drives_have_their_own_loads():
     films = [unmodelled.record(None, seed, 20.0, w) for seed, w in ((1, 0.045), (2, 0.06))]
     fit = udd.fit(films, [udd.Disk(0.045), udd.Disk(0.06)])
-    found = responses(fit)
-    values = found.along(coordinate(fit.model, "load"))
-    for model, film in zip(fit.models, found.films, strict=True):
-        own = [unmodelled.load(*state[:3], model.W) for state in found.states[film][:, 0]]
+    result = responses(fit)
+    values = result.along(coordinate(fit.model, "load"))
+    for model, film in zip(fit.models, result.films, strict=True):
+        each = [unmodelled.load(*state[:3], model.W) for state in result.states[film][:, 0]]
         # The constants are those fitted, which are the true ones to a few per cent.
-        assert np.corrcoef(values[film][:, 0], own)[0, 1] > 0.99
+        assert np.corrcoef(values[film][:, 0], each)[0, 1] > 0.99
 
 
 def test_the_form_of_a_wave_is_named():
@@ -123,9 +123,9 @@ def test_a_law_of_two_coordinates_is_located():
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_nothing_is_located_where_nothing_is_missing(seed):
-    found = scan_curves(udd.fit(unmodelled.record(None, seed, 40.0), udd.Disk(W)), pairs=True)
-    assert found.p > 1e-2
-    assert found.curves[0].evidence < 0  # no curve is more likely than any
+    result = scan_curves(udd.fit(unmodelled.record(None, seed, 40.0), udd.Disk(W)), pairs=True)
+    assert result.p > 1e-2
+    assert result.curves[0].evidence < 0  # no curve is more likely than any
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_bands_hold_the_law(case, records):
     inside = []
     for seed in range(records):
         fit = udd.fit(unmodelled.record(weak(case, 0.4), seed), udd.Disk(W))
-        only = scan_curves(fit, only=lambda slot, own: (slot.title, own[0].name) == case.found[0])
+        only = scan_curves(fit, only=lambda slot, each: (slot.title, each[0].name) == case.found[0])
         curve = identifiable_part(refined(only.curves[0], fit), fit)
         places = curve.places[0]
         places = np.mod(places, 2 * np.pi) if curve.splines[0].periodic else places
@@ -184,29 +184,29 @@ def test_slots_act_as_the_effects_of_the_library(effect, slot, name, value):
     small = 1e-6
     little = effect.replace(**{p: small * v for p, v in effect.parameters.items() if p in effect.amplitudes})
     expected = (plain.with_effects([little]).rates(0.0, x) - rates) / small
-    own, where = next(s for s in slots(plain) if s.title == slot), coordinate(plain, name)
+    each, where = next(s for s in slots(plain) if s.title == slot), coordinate(plain, name)
     at, step = where.of(np.zeros(50), x), 1e-6
     if value is None:
         value = lambda y: expected[:, 1] / at * y  # noqa: E731 (proportional, whatever the sign)
     speed = (value(at + step) - value(at - step)) / (2 * step) * where.rate(x, rates)
-    made = own.forcing(plain, x, value(at), speed)
+    made = each.forcing(plain, x, value(at), speed)
     np.testing.assert_allclose(made, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
 
 
 def test_forcings_score_as_the_effects_of_the_library(null):
     """From the flow's response, by quadrature, what the core finds by integrating with the effect."""
-    found = responses(null)
-    own = {s.title: s for s in slots(null.model)}
-    z, o = found.states[..., 2], found.states[..., 0]
-    v = found.rates
+    result = responses(null)
+    each = {s.title: s for s in slots(null.model)}
+    z, o = result.states[..., 2], result.states[..., 0]
+    v = result.rates
     columns = [
-        found.columns(own["vertical (constraint)"], (-null.model.W * z)[..., None], v[..., 2:3]),
-        found.columns(
-            own["vertical (consistent)"],
+        result.columns(each["vertical (constraint)"], (-null.model.W * z)[..., None], v[..., 2:3]),
+        result.columns(
+            each["vertical (consistent)"],
             (-null.model.W * z)[..., None],
             (-null.model.W * v[..., 2])[..., None],
         ),
-        found.columns(own["torque"], (-np.abs(o) * o)[..., None], v[..., :1]),
+        result.columns(each["torque"], (-np.abs(o) * o)[..., None], v[..., :1]),
     ]
     scores = score_forcings(null, columns)
     effects = [E.relaxation(b=0.0), E.relaxation(b=0.0, momentum="consistent"), E.quadratic_drag(c=0.0)]
@@ -225,10 +225,10 @@ def test_coordinates_change_as_they_are_said_to():
     model = udd.Disk(W)
     x = np.random.default_rng(1).normal(0, [4.0, 0.02, 0.02, 3.0], (40, 4))
     rates, step = model.rates(0.0, x), 1e-7
-    for one in coordinates(model):
-        ahead = one.of(np.full(40, step), x + step * rates)
-        back = one.of(np.full(40, -step), x - step * rates)
-        np.testing.assert_allclose((ahead - back) / (2 * step), one.rate(x, rates), rtol=1e-4, atol=1e-4)
+    for item in coordinates(model):
+        ahead = item.of(np.full(40, step), x + step * rates)
+        back = item.of(np.full(40, -step), x - step * rates)
+        np.testing.assert_allclose((ahead - back) / (2 * step), item.rate(x, rates), rtol=1e-4, atol=1e-4)
     with pytest.raises(FitError, match="a function of Omega, Y, Z"):
         coordinate(model, "X")
 
@@ -290,11 +290,11 @@ def test_bands_of_a_plain_regression_hold_the_curve():
     x = np.linspace(0.01, 0.99, 99)
     for seed in range(60):
         spline, _x, score = _regression(seed, curve)
-        found = smooth(score, spline.roughness, 400)
+        result = smooth(score, spline.roughness, 400)
         design = spline.design(x)
-        error = np.sqrt(np.einsum("ik,kl,il->i", design, found.covariance, design))
-        inside.append(np.mean(np.abs(design @ found.coefficients - curve(x)) < 1.96 * error))
-        frequencies.append(found.df)
+        error = np.sqrt(np.einsum("ik,kl,il->i", design, result.covariance, design))
+        inside.append(np.mean(np.abs(design @ result.coefficients - curve(x)) < 1.96 * error))
+        frequencies.append(result.df)
     # 60 records with some 6 independent places each: +- 1.2 %.
     assert 0.92 < np.mean(inside) < 0.985
     assert 4 < np.mean(frequencies) < 12
@@ -304,15 +304,15 @@ def test_a_straight_line_is_charged_as_two_parameters():
     """Where nothing is bent the evidence is that of the Bayesian information criterion, about."""
     for size in (0.1, 30.0):
         spline, _x, score = _regression(1, lambda x, size=size: size * x)
-        found = smooth(score, spline.roughness, 400)
+        result = smooth(score, spline.roughness, 400)
         line = np.column_stack([np.ones(spline.size), np.arange(spline.size)])
         gradient, information = line.T @ score.gradient, line.T @ score.information @ line
         best = gradient @ np.linalg.solve(information, gradient) / 2
         # A line that is seen very well costs more than a parameter's usual price.
         charge = np.log(max(400, 2 * best))
         # How smooth it is was not known beforehand (3 nats); some waves may fit the noise.
-        assert best - charge - 5 < found.evidence < best - charge + 3
-        assert found.df < 4
+        assert best - charge - 5 < result.evidence < best - charge + 3
+        assert result.df < 4
 
 
 def test_chance_is_what_it_says():
@@ -333,7 +333,7 @@ def test_chance_is_what_it_says():
 def test_what_parameters_absorb_is_left_out(null):
     """A constant upward velocity of the contact is the drive's."""
     only = scan_curves(
-        null, only=lambda slot, own: (slot.title, own[0].name) == ("vertical (constraint)", "Z")
+        null, only=lambda slot, each: (slot.title, each[0].name) == ("vertical (constraint)", "Z")
     )
     curve = only.curves[0]
     theirs = confounded_directions(curve, null)
@@ -362,8 +362,8 @@ def test_a_wave_between_the_places_is_no_law(null):
 def test_a_curve_known_without_error_has_formulas_too(null):
     """Where the free parameters can do all that a curve does at a place, it has no error there."""
     curve = next(c for c in scan_curves(null).curves if not c.splines[0].periodic)
-    known = replace(curve, covariance=0.0 * curve.covariance)
-    assert formulas_for(known, 3000).formulas
+    baseline = replace(curve, covariance=0.0 * curve.covariance)
+    assert formulas_for(baseline, 3000).formulas
 
 
 def test_formulas_are_read_by_a_whitelist():
@@ -421,7 +421,7 @@ def test_without_pyoperon_the_usual_forms_are_tried(monkeypatch):
     case = unmodelled.CASES[0]
     fit = udd.fit(unmodelled.record(weak(case), 5, 40.0), udd.Disk(W))
     monkeypatch.setitem(sys.modules, "pyoperon.sklearn", None)
-    only = scan_curves(fit, only=lambda slot, own: (slot.title, own[0].name) == case.found[0])
+    only = scan_curves(fit, only=lambda slot, each: (slot.title, each[0].name) == case.found[0])
     described = formulas_for(only.curves[0], 3000)
     assert "udd[formula]" in described.note
     assert described.formulas
@@ -443,22 +443,22 @@ def test_a_located_curve_is_fitted_in_full():
     base = fit_record(measured, record_of(measured), udd.Disk(W), search=True)
     plain = udd.fit(unmodelled.record(None, 1), udd.Disk(W))
     assert base.scatter > 3
-    found = fit_curve(base, scan_curves(with_larger_model_error(base, 3.0)).curves[0])
-    assert found.fit.converged
-    assert found.fit.scatter < 1.1 * plain.scatter
-    assert 5 < found.curve.df < 20
-    x = np.quantile(found.curve.places[0], np.linspace(0.01, 0.99, 99))
-    off = found.curve.values(x) - found.curve.beside(case.curve(x), x)
-    assert np.mean(np.abs(off) < 1.96 * found.curve.errors(x)) > 0.8
+    result = fit_curve(base, scan_curves(with_larger_model_error(base, 3.0)).curves[0])
+    assert result.fit.converged
+    assert result.fit.scatter < 1.1 * plain.scatter
+    assert 5 < result.curve.df < 20
+    x = np.quantile(result.curve.places[0], np.linspace(0.01, 0.99, 99))
+    off = result.curve.values(x) - result.curve.beside(case.curve(x), x)
+    assert np.mean(np.abs(off) < 1.96 * result.curve.errors(x)) > 0.8
     # The effect is the curve.
-    made = found.fit.model.rates(0.0, np.column_stack([0 * x, 0 * x, x, 0 * x]))[:, 2] - found.fit.model.W
-    np.testing.assert_allclose(made, found.curve.values(x), atol=1e-12)
-    best = formulas_for(found.curve, 4500).formulas[0]
-    fitted = fit_formula(base, found.curve, best)
+    made = result.fit.model.rates(0.0, np.column_stack([0 * x, 0 * x, x, 0 * x]))[:, 2] - result.fit.model.W
+    np.testing.assert_allclose(made, result.curve.values(x), atol=1e-12)
+    best = formulas_for(result.curve, 4500).formulas[0]
+    fitted = fit_formula(base, result.curve, best)
     assert fitted.converged
     # All its constants were free, and it explains the data as well, for less.
     assert {f"formula.{p}" for p in best.parameters} <= set(fitted.parameters)
-    assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < found.fit.chi2 / 2 + found.price
+    assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < result.fit.chi2 / 2 + result.price
 
 
 @pytest.mark.nightly  # so far from the known model it depends on the last bits whether a fit is found
@@ -468,10 +468,10 @@ def test_moves_that_lead_astray_are_halved():
     measured = unmodelled.record(weak(case, 4.0), 1)
     base = fit_record(measured, record_of(measured), udd.Disk(W), search=True)
     curves = scan_curves(with_larger_model_error(base, 3.0)).curves
-    found = fit_curve(base, next(c for c in curves if c.name == case.found[0]))
-    assert found.fit.converged and found.fit.level == base.level
+    result = fit_curve(base, next(c for c in curves if c.name == case.found[0]))
+    assert result.fit.converged and result.fit.level == base.level
     # Not to the noise, for so far from the known model one curve does not do; full moves end in no fit.
-    assert found.fit.scatter < 0.2 * base.scatter
+    assert result.fit.scatter < 0.2 * base.scatter
 
 
 def test_a_broken_power_can_be_fitted():
@@ -501,26 +501,26 @@ def test_one_law_takes_the_place_of_several_that_come_near_it():
 
     law = lambda t, o, y, z, b: (float(push(np.arctan2(y, z))), 0.0, 0.0)  # noqa: E731
     measured = unmodelled.record(law, 5, 40.0, noise=(5e-4, 7e-3))
-    found = udd.discover(measured, udd.Disk(W))
-    (effect,) = found.effects
+    result = udd.discover(measured, udd.Disk(W))
+    (effect,) = result.effects
     assert effect.curve.name == ("torque", "theta")
     theta = np.arange(-3, 3.1, 0.25)
     curve = effect.curve
     off = (curve.values(theta) - curve.beside(push(theta), theta)) / curve.errors(theta)
     assert np.sqrt(np.mean(off**2)) < 2
-    k = found.error_after.horizons.index(1.0)
-    assert found.error_after.median[k] < 1.3 * found.error_after.floor[k]  # known to some 10 % each
+    k = result.error_after.horizons.index(1.0)
+    assert result.error_after.median[k] < 1.3 * result.error_after.floor[k]  # known to some 10 % each
 
 
 def test_a_surface_is_added_and_refitted():
     law = lambda t, o, y, z, b: (6 * y * z, 0.0, 0.0)  # noqa: E731
     base = udd.fit(unmodelled.record(law, 1), udd.Disk(W))
-    found = scan_curves(
+    result = scan_curves(
         base,
         pairs=True,
-        only=lambda slot, own: slot.name == "torque" and [c.name for c in own] == ["Y", "Z"],
+        only=lambda slot, each: slot.name == "torque" and [c.name for c in each] == ["Y", "Z"],
     )
-    located = fit_curve(base, found.curves[0], "surface")
+    located = fit_curve(base, result.curves[0], "surface")
     assert located.fit.converged
     # Not by chi2: the plain model has to be held more loosely, where any model fits.
     assert located.fit.evidence > base.evidence + 200
@@ -542,7 +542,7 @@ def test_a_velocity_is_scored_with_its_momentum_and_without():
     def law(t, o, y, z, b):
         return 0.0, 0.0, 2.0 * float(unmodelled.grip(z))
 
-    found = scan_curves(udd.fit(unmodelled.record(law, 1, 40.0), udd.Disk(W)))
-    first = found.curves[0]
-    other = next(c for c in found.curves[1:] if c.kin == first.kin)
+    result = scan_curves(udd.fit(unmodelled.record(law, 1, 40.0), udd.Disk(W)))
+    first = result.curves[0]
+    other = next(c for c in result.curves[1:] if c.kin == first.kin)
     assert {first.slot.momentum, other.slot.momentum} == {"constraint", "consistent"}

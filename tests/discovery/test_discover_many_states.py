@@ -14,11 +14,11 @@ def test_a_cubic_spring_of_one_oscillator_of_four_is_named() -> None:
     true = chain(4, v3="-0.5*x3^3")
     state = udd.simulate(true, t, 1.2 * np.cos(np.arange(8.0)), rtol=1e-10).state
     noisy = state + 0.01 * np.random.default_rng(0).standard_normal(state.shape)
-    known = chain(4)
-    seen = udd.Measurement(t, dict(zip(known.state_names, noisy.T, strict=True)))
-    found = udd.discover(seen, known)
-    assert found.verdict == "effect identified"
-    (effect,) = found.effects
+    baseline = chain(4)
+    seen = udd.Measurement(t, dict(zip(baseline.state_names, noisy.T, strict=True)))
+    result = udd.discover(seen, baseline)
+    assert result.verdict == "effect identified"
+    (effect,) = result.effects
     assert effect.title == "x3^3 in v3'"
     (value,) = effect.parameters.values()
     (error,) = effect.errors.values()

@@ -79,17 +79,17 @@ def test_the_candidates_are_made_of_the_states() -> None:
 
 def test_the_damping_of_the_diffusionless_lorenz_system_is_found_in_noise() -> None:
     equations = {"omega": "y - omega", "y": "omega*z", "z": "-omega*y + w"}
-    known = udd.Model(list(equations), equations, {"w": 1.0})
-    truth = known.with_term("z", "z", damping=-0.2)
+    baseline = udd.Model(list(equations), equations, {"w": 1.0})
+    truth = baseline.with_term("z", "z", damping=-0.2)
     record = seen(truth, np.arange(0, 40, 0.05), [1.0, 1.0, 0.5], 0.05, list(equations))
-    found = udd.discover(record, known)
-    assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["z in z'"]
-    within(found, "z_in_z.c", -0.2)
-    assert found.effects[0].ratio[2] < 0.2
+    result = udd.discover(record, baseline)
+    assert result.verdict == "effect identified" and [e.title for e in result.effects] == ["z in z'"]
+    within(result, "z_in_z.c", -0.2)
+    assert result.effects[0].ratio[2] < 0.2
     # The errors fall to what noise alone leaves, here to within the scatter of a few dozen starts.
-    assert (found.error_after.median[:3] < 2 * found.error_after.floor[:3]).all()
-    assert found.model.with_effects([]) == found.model.replace(effects=[])
-    assert found.to_dict()["effects"][0]["parameters"]["c"]["se"] > 0
+    assert (result.error_after.median[:3] < 2 * result.error_after.floor[:3]).all()
+    assert result.model.with_effects([]) == result.model.replace(effects=[])
+    assert result.to_dict()["effects"][0]["parameters"]["c"]["se"] > 0
 
 
 @pytest.mark.parametrize(
@@ -104,40 +104,40 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
     lacking: str, title: str | None, values: dict[str, float]
 ) -> None:
     truth = udd.Model(["theta", "v"], DRIVEN | {"v": DRIVEN["v"] + lacking}, DRIVEN_VALUES)
-    known = udd.Model(["theta", "v"], DRIVEN, {"w2": 3.8, "g": 0.1, "F": 1.8}, angles=["theta"])
+    baseline = udd.Model(["theta", "v"], DRIVEN, {"w2": 3.8, "g": 0.1, "F": 1.8}, angles=["theta"])
     record = seen(truth, np.arange(0, 60, 0.06), [0.5, 0.0], 0.002, ["theta"])
-    found = udd.discover(record, known)
+    result = udd.discover(record, baseline)
     if title is None:
-        assert found.verdict == "nothing missing" and not found.effects
+        assert result.verdict == "nothing missing" and not result.effects
         return
-    assert found.verdict == "effect identified"
-    assert len(found.effects) == 1 and found.effects[0].title.startswith(title)
+    assert result.verdict == "effect identified"
+    assert len(result.effects) == 1 and result.effects[0].title.startswith(title)
     for name, value in values.items():
-        within(found, name, value)
+        within(result, name, value)
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.nightly)])  # 0 asks the same as 1
 def test_what_a_later_effect_makes_needless_is_left_out_together(seed: int) -> None:
     # At first two other terms together do the missing one's work; beside it neither is needed.
-    known = udd.Model(["x", "y"], ["1 - a*x + b*x^2*y", "k*x"], {"a": 3.6, "b": 3.4, "k": 3.3})
-    truth = known.replace(a=4.03, b=3.1, k=3.03).with_term("y", "x^2*y", loss=-3.1)
+    baseline = udd.Model(["x", "y"], ["1 - a*x + b*x^2*y", "k*x"], {"a": 3.6, "b": 3.4, "k": 3.3})
+    truth = baseline.replace(a=4.03, b=3.1, k=3.03).with_term("y", "x^2*y", loss=-3.1)
     t = np.linspace(0, 10, 512)
     states = udd.simulate(truth, t, [0.7, -1.4]).state
     noisy = states * (1 + 0.05 * np.random.default_rng(seed).standard_normal(states.shape))
-    found = udd.discover(udd.Measurement(t, dict(zip("xy", noisy.T, strict=True))), known)
-    assert found.verdict == "effect identified" and [e.title for e in found.effects] == ["x^2*y in y'"]
-    within(found, "x2_y_in_y.c", -3.1)
+    result = udd.discover(udd.Measurement(t, dict(zip("xy", noisy.T, strict=True))), baseline)
+    assert result.verdict == "effect identified" and [e.title for e in result.effects] == ["x^2*y in y'"]
+    within(result, "x2_y_in_y.c", -3.1)
 
 
 def test_a_model_that_cannot_follow_the_record_lacks_something() -> None:
     # Without its growth the oscillator comes to rest; no candidate fits while y is not seen.
     values = {"a": 3.37, "b": -3.37 / 3, "c": -1 / 3.37}
-    known = udd.Model(["x", "y"], ["a*y + b*x^3", "c*x"], {"a": 3.05, "b": -0.91, "c": -0.32})
+    baseline = udd.Model(["x", "y"], ["a*y + b*x^3", "c*x"], {"a": 3.05, "b": -0.91, "c": -0.32})
     t = np.linspace(0, 10, 256)
-    states = udd.simulate(known.replace(**values).with_term("x", "x", g=3.37), t, [0.7, 0.0]).state
-    found = udd.discover(udd.Measurement(t, {"x": states[:, 0]}), known, state0={"y": 0.0})
-    assert found.fit.doubts.missing or found.effects
-    assert found.verdict != "nothing missing"
+    states = udd.simulate(baseline.replace(**values).with_term("x", "x", g=3.37), t, [0.7, 0.0]).state
+    result = udd.discover(udd.Measurement(t, {"x": states[:, 0]}), baseline, state0={"y": 0.0})
+    assert result.fit.doubts.missing or result.effects
+    assert result.verdict != "nothing missing"
 
 
 #: Two bodies on a double pendulum's angles, the force of which goes through their mass matrix.
@@ -153,8 +153,8 @@ MECHANISM = {
 
 
 def mechanism(*forces: udd.effects.Effect) -> Any:
-    known = udd.Model(list("xyvw"), MECHANISM, {"k": 10.0}, angles=["x", "y"], mass=COUPLED)
-    return known.with_effects(forces)
+    baseline = udd.Model(list("xyvw"), MECHANISM, {"k": 10.0}, angles=["x", "y"], mass=COUPLED)
+    return baseline.with_effects(forces)
 
 
 def test_friction_in_both_joints_is_found_by_joint(tmp_path: Path) -> None:
@@ -167,15 +167,15 @@ def test_friction_in_both_joints_is_found_by_joint(tmp_path: Path) -> None:
     run = udd.simulate(truth, t, [1.2, -0.5, 0.0, 0.0]).state
     noise = 3e-3 * np.random.default_rng(0).standard_normal((len(t), 2))
     record = udd.Measurement(t, run[:, :2] + noise, names=("x", "y"))
-    found = udd.discover(record, mechanism().replace(k=9.9))
-    assert found.verdict == "effect identified"
-    assert {e.title for e in found.effects} == {
+    result = udd.discover(record, mechanism().replace(k=9.9))
+    assert result.verdict == "effect identified"
+    assert {e.title for e in result.effects} == {
         "viscous friction along x",
         "viscous friction between x and y",
     }
-    within(found, "viscous_friction_along_x.c", 0.04)
-    within(found, "viscous_friction_between_x_and_y.c", 0.05)
-    found.report(tmp_path / "page.html")
+    within(result, "viscous_friction_along_x.c", 0.04)
+    within(result, "viscous_friction_between_x_and_y.c", 0.05)
+    result.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "a force that enters every acceleration through the mass matrix" in page.lower()
 
@@ -199,11 +199,11 @@ def test_forces_of_machines_come_before_products() -> None:
 
 def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
     equations = {"x": "v", "v": "-k*x"}
-    known = udd.Model(["x", "v"], equations, {"k": 1.0})
-    record = seen(known.with_term("v", "v", c=-0.1), np.arange(0, 30, 0.05), [1.5, 0.0], 0.01, ["x"])
-    frames = record_of(record, known)
+    baseline = udd.Model(["x", "v"], equations, {"k": 1.0})
+    record = seen(baseline.with_term("v", "v", c=-0.1), np.arange(0, 30, 0.05), [1.5, 0.0], 0.01, ["x"])
+    frames = record_of(record, baseline)
     train = frames.first(TRAIN)
-    part, whole = (fit_record(record, some, known, search=True) for some in (frames.part(train), frames))
+    part, whole = (fit_record(record, some, baseline, search=True) for some in (frames.part(train), frames))
     search = Search(Acceptance(frames, ~train, Clock(None, lambda _text: None), motion_time_scale(part)))
     states, accepted, rounds = [SearchState(part, whole, search.tests.errors(part))], [], []
     for title in ("v^3 in v'", "v in v'"):
@@ -221,23 +221,23 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
 
 @pytest.mark.nightly  # test_friction_in_both_joints_is_found_by_joint asks the same of forces
 def test_damping_at_the_joint_of_a_double_pendulum_is_found_from_its_angles() -> None:
-    known = udd.Model(list("abpq"), DOUBLE, {"g": 9.7}, angles=["a", "b"])
-    truth = known.with_parameters({"g": 9.81}).with_term("q", DB, c=-0.05)
-    found = udd.discover(seen(truth, np.arange(0, 12, 0.03), [1.5, 0.8, 0.0, 0.0], 0.01, "ab"), known)
-    assert [e.title for e in found.effects] == ["b' in q'"]
-    within(found, "rate_of_b_in_q.c", -0.05)
-    within(found, "g", 9.81)
+    baseline = udd.Model(list("abpq"), DOUBLE, {"g": 9.7}, angles=["a", "b"])
+    truth = baseline.with_parameters({"g": 9.81}).with_term("q", DB, c=-0.05)
+    result = udd.discover(seen(truth, np.arange(0, 12, 0.03), [1.5, 0.8, 0.0, 0.0], 0.01, "ab"), baseline)
+    assert [e.title for e in result.effects] == ["b' in q'"]
+    within(result, "rate_of_b_in_q.c", -0.05)
+    within(result, "g", 9.81)
 
 
 def test_a_users_candidate_is_tried_and_a_wrong_one_named(tmp_path: Path) -> None:
     equations = {"x": "v", "v": "-k*x"}
-    known = udd.Model(["x", "v"], equations, {"k": 1.0})
-    truth = known.with_term("v", "tanh(5*v)", friction=-0.05)
+    baseline = udd.Model(["x", "v"], equations, {"k": 1.0})
+    truth = baseline.with_term("v", "tanh(5*v)", friction=-0.05)
     record = seen(truth, np.arange(0, 40, 0.05), [1.5, 0.0], 0.01, ["x", "v"])
-    found = udd.discover(record, known, candidates=[("v", "tanh(5*v)")])
-    assert [e.title for e in found.effects] == ["tanh(5*v) in v'"]
-    within(found, "tanh_5_v_in_v.c", -0.05)
-    found.report(tmp_path / "page.html")
+    result = udd.discover(record, baseline, candidates=[("v", "tanh(5*v)")])
+    assert [e.title for e in result.effects] == ["tanh(5*v) in v'"]
+    within(result, "tanh_5_v_in_v.c", -0.05)
+    result.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "The rate v&#39; has one more term." in page and "c*(tanh(5*v))" in page
     assert page.count("<img") == 6 and "data:image/svg+xml" in page  # no picture comes from elsewhere
@@ -247,7 +247,7 @@ def test_a_users_candidate_is_tried_and_a_wrong_one_named(tmp_path: Path) -> Non
         ("v", "a state and a term"),
     ]:
         with pytest.raises(ModelError, match=said):
-            udd.discover(record, known, candidates=[wrong])  # type: ignore[list-item]
+            udd.discover(record, baseline, candidates=[wrong])  # type: ignore[list-item]
     t = np.arange(0, 30, 0.05)
     swing = udd.Measurement(t, {"theta": 0.1 * np.cos(3 * t)})
     with pytest.raises(FitError, match="for a model of your own"):
@@ -273,17 +273,17 @@ def test_the_command_takes_a_users_model(tmp_path: Path, capsys: pytest.CaptureF
 def test_lorenz63_is_recovered_from_thirty_percent_noise() -> None:
     terms = ["1", "x", "y", "z", "x^2", "x*y", "x*z", "y^2", "y*z", "z^2"]
     names = [[f"{s}{k}" for k in range(10)] for s in "xyz"]
-    rates = [" + ".join(f"{c}*{term}" for c, term in zip(own, terms, strict=True)) for own in names]
-    full = udd.Model(list("xyz"), rates, {name: 0.0 for own in names for name in own})
+    rates = [" + ".join(f"{c}*{term}" for c, term in zip(each, terms, strict=True)) for each in names]
+    full = udd.Model(list("xyz"), rates, {name: 0.0 for part in names for name in part})
     truth = {"x1": -10.0, "x2": 10.0, "y1": 28.0, "y2": -1.0, "y6": -1.0, "z3": -8 / 3, "z5": 1.0}
     run = udd.simulate(full.with_parameters(truth), np.arange(0, 10, 0.01), [-8.0, 8.0, 27.0])
     noise = 0.3 * run.state.std() * np.random.default_rng(1001).standard_normal(run.state.shape)
     record = udd.Measurement(run.t, dict(zip("xyz", (run.state + noise).T, strict=True)))
-    found = udd.prune(record, full, spread=100.0)
-    assert found.kept == list(truth) and len(found.removed) == 23
+    result = udd.prune(record, full, spread=100.0)
+    assert result.kept == list(truth) and len(result.removed) == 23
     for name, value in truth.items():
-        assert abs(found.fit.parameters[name] - value) < 4 * found.fit.errors[name]
-    assert min(found.rise.values()) > found.price
+        assert abs(result.fit.parameters[name] - value) < 4 * result.fit.errors[name]
+    assert min(result.rise.values()) > result.price
     with pytest.raises(FitError, match="'w' is not a free parameter"):
         udd.prune(record, full, among=["w"])
     with pytest.raises(FitError, match="spread must be above 0"):
@@ -300,13 +300,13 @@ def test_terms_that_an_orbit_does_not_determine_go_first(noise: float) -> None:
     states = np.column_stack([np.cos(pace * t), -pace * np.sin(pace * t)])
     scatter = np.random.default_rng(3).standard_normal(states.shape)
     record = udd.Measurement(t, dict(zip("xv", (states + noise * scatter).T, strict=True)))
-    found = udd.prune(record, full)
-    assert found.kept == ["a", "k1"]
+    result = udd.prune(record, full)
+    assert result.kept == ["a", "k1"]
     if noise:
         return
     # v^2 + 2.1 x^2 is constant: three terms are combinations of the others.
-    assert found.undetermined == ["k5", "k8", "k9"] and set(found.undetermined) < set(found.removed)
-    assert found.fit.parameters["k1"] == pytest.approx(-2.1, rel=1e-8)
+    assert result.undetermined == ["k5", "k8", "k9"] and set(result.undetermined) < set(result.removed)
+    assert result.fit.parameters["k1"] == pytest.approx(-2.1, rel=1e-8)
     with pytest.raises(FitError, match="can change together"):
         udd.prune(record, full, among=["k0", "k1"])
 
@@ -315,29 +315,29 @@ def test_noise_that_grows_with_what_is_seen_is_weighed_by_it() -> None:
     # Predator and prey: one is hundreds of times rarer at times, and then known as many times better.
     truth = {"a": 1.84, "b": -1.45, "c": -3.0, "d": 1.62}
     t = np.linspace(0, 10, 512)
-    known = udd.Model(["x", "y"], ["a*x + b*x*y", "c*y + d*x*y"], truth)
-    states = udd.simulate(known, t, [8.3, 3.4]).state
+    baseline = udd.Model(["x", "y"], ["a*x + b*x*y", "c*y + d*x*y"], truth)
+    states = udd.simulate(baseline, t, [8.3, 3.4]).state
     noisy = states * (1 + 0.01 * np.random.default_rng(1).standard_normal(states.shape))
     record = udd.Measurement(t, dict(zip("xy", noisy.T, strict=True)))
     powers = ["1", "x", "y", "x^2", "x*y", "y^2"]
-    names = [[f"k{own}{k}" for k in range(len(powers))] for own in "xy"]
-    texts = [" + ".join(f"{n}*{p}" for n, p in zip(own, powers, strict=True)) for own in names]
-    full = udd.Model(["x", "y"], texts, {n: 0.0 for own in names for n in own})
-    found = udd.prune(record, full)
-    assert found.kept == ["kx1", "kx4", "ky2", "ky4"]
-    for name, value in zip(found.kept, truth.values(), strict=True):
-        assert abs(found.fit.parameters[name] - value) < 4 * found.fit.errors[name]
-    assert found.fit.scatter == pytest.approx(1.0, abs=0.2)
+    names = [[f"k{each}{k}" for k in range(len(powers))] for each in "xy"]
+    texts = [" + ".join(f"{n}*{p}" for n, p in zip(part, powers, strict=True)) for part in names]
+    full = udd.Model(["x", "y"], texts, {n: 0.0 for own_value in names for n in own_value})
+    result = udd.prune(record, full)
+    assert result.kept == ["kx1", "kx4", "ky2", "ky4"]
+    for name, value in zip(result.kept, truth.values(), strict=True):
+        assert abs(result.fit.parameters[name] - value) < 4 * result.fit.errors[name]
+    assert result.fit.scatter == pytest.approx(1.0, abs=0.2)
 
 
 def test_computed_motion_has_no_noise_and_keeps_its_terms() -> None:
     # Every fit of it is exact to the last digits, and the noise that it shows is zero.
     t = np.linspace(0, 10, 512)
     full = udd.Model(["x"], ["a + b*x + c*x^2 + d*x^3"], dict.fromkeys("abcd", 0.0))
-    found = udd.prune(udd.Measurement(t, {"x": logistic(t)}), full)
-    assert found.kept == ["b", "c"] and not found.undetermined
-    assert found.fit.parameters["b"] == pytest.approx(0.8, rel=1e-9)
-    assert found.fit.parameters["c"] == pytest.approx(-0.01, rel=1e-9)
+    result = udd.prune(udd.Measurement(t, {"x": logistic(t)}), full)
+    assert result.kept == ["b", "c"] and not result.undetermined
+    assert result.fit.parameters["b"] == pytest.approx(0.8, rel=1e-9)
+    assert result.fit.parameters["c"] == pytest.approx(-0.01, rel=1e-9)
 
 
 def test_effects_belong_to_own_models_as_terms_do() -> None:
@@ -367,23 +367,23 @@ def test_a_known_model_whose_free_runs_blow_up_is_found_to_lack_its_growth(tmp_p
     t = np.linspace(0, 10, 512)
     x = logistic(t) + 0.3 * np.random.default_rng(0).standard_normal(len(t))
     # Of x' = k x^2 with k > 0, which the growth at first asks for, a run from 75 ends within the record.
-    found = udd.discover(udd.Measurement(t, {"x": x}), udd.Model(["x"], ["k*x^2"], {"k": 0.001}))
-    assert found.verdict == "effect identified"
-    assert [f.title for f in found.effects] == ["x in x'"]
-    within(found, "x_in_x.c", 0.8)
-    within(found, "k", -0.01)
-    assert found.report(tmp_path / "page.html")
+    result = udd.discover(udd.Measurement(t, {"x": x}), udd.Model(["x"], ["k*x^2"], {"k": 0.001}))
+    assert result.verdict == "effect identified"
+    assert [f.title for f in result.effects] == ["x in x'"]
+    within(result, "x_in_x.c", 0.8)
+    within(result, "k", -0.01)
+    assert result.report(tmp_path / "page.html")
 
 
 @pytest.mark.parametrize("record", [logistic, lambda t: 2.0 - 1.5 * np.exp(-0.4 * t)])
 def test_what_a_record_without_noise_lacks_is_identified(record: Any) -> None:
     t = np.linspace(0, 10, 512)
-    known = "k*x^2" if record is logistic else "k"
-    found = udd.discover(udd.Measurement(t, {"x": record(t)}), udd.Model(["x"], [known], {"k": 0.001}))
+    baseline = "k*x^2" if record is logistic else "k"
+    result = udd.discover(udd.Measurement(t, {"x": record(t)}), udd.Model(["x"], [baseline], {"k": 0.001}))
     # Free runs are off by what integration leaves, and what that leaves is no noise.
-    assert (found.verdict, [f.title for f in found.effects]) == ("effect identified", ["x in x'"])
+    assert (result.verdict, [f.title for f in result.effects]) == ("effect identified", ["x in x'"])
     expected = 0.8 if record is logistic else -0.4
-    assert found.fit.parameters["x_in_x.c"] == pytest.approx(expected, rel=1e-8)
+    assert result.fit.parameters["x_in_x.c"] == pytest.approx(expected, rel=1e-8)
 
 
 def test_a_short_record_whose_held_out_part_holds_few_stretches_confirms_what_it_shows() -> None:
@@ -392,9 +392,9 @@ def test_a_short_record_whose_held_out_part_holds_few_stretches_confirms_what_it
     x, v = 0.12 * turning.real, 0.12 * ((-0.2 + 2.1j) * turning).real
     rng = np.random.default_rng(0)
     noisy = {name: s + 0.01 * s.std() * rng.standard_normal(len(t)) for name, s in (("x", x), ("v", v))}
-    found = udd.discover(udd.Measurement(t, noisy), udd.Model(["x", "v"], ["v", "-k*x"], {"k": 4.0}))
+    result = udd.discover(udd.Measurement(t, noisy), udd.Model(["x", "v"], ["v", "-k*x"], {"k": 4.0}))
     # Free runs start in two stretches of the held-out part only, which say nothing about their spread.
-    assert (found.verdict, [f.title for f in found.effects]) == ("effect identified", ["v in v'"])
-    within(found, "v_in_v.c", -0.4)
-    within(found, "k", 0.04 + 2.1**2)
-    assert found.ratio[2] < 1.0
+    assert (result.verdict, [f.title for f in result.effects]) == ("effect identified", ["v in v'"])
+    within(result, "v_in_v.c", -0.4)
+    within(result, "k", 0.04 + 2.1**2)
+    assert result.ratio[2] < 1.0

@@ -40,14 +40,14 @@ SCORED = [E.relaxation(b=4.0), E.quadratic_drag(c=3e-4), E.radial_slip(c=0.005)]
 def test_an_undeclared_effect_scores_first_and_has_its_size(effect):
     truth = udd.Disk(0.045, effects=[effect])
     measured, _states = simulated.film(truth, np.random.default_rng(11), 30.0)
-    known = fit_record(measured, record_of(measured), udd.Disk(0.045), search=True)
-    first = score_round(known).usable()[0]
+    baseline = fit_record(measured, record_of(measured), udd.Disk(0.045), search=True)
+    first = score_round(baseline).usable()[0]
     assert first.candidate.effect.name == effect.name and first.candidate.effect.momentum == effect.momentum
-    fitted = of_library(known, [first.candidate], list(first.amplitudes)).fit
+    fitted = of_library(baseline, [first.candidate], list(first.amplitudes)).fit
     for name in effect.amplitudes:
-        value, found = effect.parameters[name], f"{effect.name}.{name}"
-        error = np.hypot(fitted.errors[found], 0.004 * abs(value))
-        assert abs(fitted.parameters[found] - value) < 4.5 * error
+        value, result = effect.parameters[name], f"{effect.name}.{name}"
+        error = np.hypot(fitted.errors[result], 0.004 * abs(value))
+        assert abs(fitted.parameters[result] - value) < 4.5 * error
 
 
 @pytest.mark.parametrize(
@@ -64,16 +64,16 @@ def test_an_undeclared_effect_scores_first_and_has_its_size(effect):
     ids=lambda e: f"{e.name}-{e.momentum}",
 )
 def test_an_undeclared_effect_is_named(effect):
-    found = search(effect, seed=11)
+    result = search(effect, seed=11)
     if effect.name == "tilt":
         # Seen by a camera that may be turned, it is a drive that pulls to the side, u = a: both are named.
-        assert [a.effect.expression[:4] for a in found.alternatives] == ["u = "]
+        assert [a.effect.expression[:4] for a in result.alternatives] == ["u = "]
     else:
-        assert found.verdict == "effect identified"
-    assert len(found.effects) == 1
-    chosen = found.effects[0]
+        assert result.verdict == "effect identified"
+    assert len(result.effects) == 1
+    chosen = result.effects[0]
     # A relaxation -b W Z and a slip c Z are one and the same at one drive: either may come first.
-    same = {chosen.effect.name, *(a.effect.name for a in found.alternatives if a.likeness > 0.9999)}
+    same = {chosen.effect.name, *(a.effect.name for a in result.alternatives if a.likeness > 0.9999)}
     assert effect.name in same
     assert chosen.effect.momentum == effect.momentum
     amplitudes = {n: v for n, v in effect.parameters.items() if n in effect.amplitudes}
@@ -93,22 +93,22 @@ def test_an_undeclared_effect_is_named(effect):
         assert abs(chosen.parameters[name] - value) < 4.5 * error, name
     # Errors before and after, on data that no fit saw.
     assert chosen.ratio[2] < 1.0
-    k = found.error_after.horizons.index(1.0)
-    assert found.error_after.median[k] < found.error_before.median[k]
+    k = result.error_after.horizons.index(1.0)
+    assert result.error_after.median[k] < result.error_before.median[k]
     # Sixty starts give a median to about 15 %, in the floor as well.
-    assert found.error_after.median[k] < 1.5 * found.error_after.floor[k]
+    assert result.error_after.median[k] < 1.5 * result.error_after.floor[k]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_nothing_is_found_where_nothing_is_missing(seed):
-    found = search(None, seed)
-    assert found.verdict == "nothing missing"
-    assert found.effects == []
-    assert found.alternatives == []
-    assert found.ratio == (1.0, 1.0, 1.0)
+    result = search(None, seed)
+    assert result.verdict == "nothing missing"
+    assert result.effects == []
+    assert result.alternatives == []
+    assert result.ratio == (1.0, 1.0, 1.0)
     # What is said of the known model is what its best fit says.
-    assert found.baseline.parameters == found.fit.parameters
-    assert found.baseline.errors == found.fit.errors
+    assert result.baseline.parameters == result.fit.parameters
+    assert result.baseline.errors == result.fit.errors
 
 
 @pytest.mark.parametrize(
@@ -134,8 +134,8 @@ def test_held_out_frames_that_hardly_tell_may_still_want_the_effect(monkeypatch,
     for some in (record.part(train), record):
         before = fit_record(measured, some, udd.Disk(0.045), search=True)
         pairs.append(confirmation.same_level(before, extend(before, [E.quadratic_drag()], [0.0])))
-    found = confirmation.confirmed_by(*pairs, record.part(~train), ["quadratic_drag.c"], 1.0)
-    assert found == (ratio, witness)
+    result = confirmation.confirmed_by(*pairs, record.part(~train), ["quadratic_drag.c"], 1.0)
+    assert result == (ratio, witness)
 
 
 @pytest.mark.parametrize("c", [5e-4, 0.0])
@@ -148,8 +148,8 @@ def test_both_halves_of_a_record_must_want_an_effect(c):
 
 
 def test_a_shape_between_those_tried_is_found():
-    found = search(E.stribeck(c=0.01, fade=1.7), seed=1, duration=40.0)
-    (effect,) = found.effects
+    result = search(E.stribeck(c=0.01, fade=1.7), seed=1, duration=40.0)
+    (effect,) = result.effects
     assert effect.title == "Stribeck friction"
     for name, value in (("c", 0.01), ("fade", 1.7)):
         assert abs(effect.parameters[name] - value) < 4 * effect.errors[name] + 0.004 * value
@@ -162,22 +162,22 @@ def test_what_a_film_gets_wrong_is_no_effect():
     measured, _ = simulated.film(udd.Disk(0.03), np.random.default_rng(1), 80.0, camera)
     seen = np.array(measured.values)
     seen[:, 2] += 2.5e-4 * np.sin(4 * seen[:, 2])
-    told: list[str] = []
-    found = udd.discover(udd.Measurement(measured.t, seen), udd.Disk(0.03), progress=told.append)
-    (strongest,) = [s for s in found.scans[0] if s.candidate.title == "uneven disk (n = 4)"]
+    reported: list[str] = []
+    result = udd.discover(udd.Measurement(measured.t, seen), udd.Disk(0.03), progress=reported.append)
+    (strongest,) = [s for s in result.scans[0] if s.candidate.title == "uneven disk (n = 4)"]
     assert strongest.chi2 > 50.0  # chance alone would not explain it
-    assert found.effects == []
-    assert not [line for line in told if line.startswith("trying")]
+    assert result.effects == []
+    assert not [line for line in reported if line.startswith("trying")]
 
 
 def test_an_effect_outside_the_library_is_located_and_written_down():
-    found = discovered.outside()
-    (effect,) = found.effects
+    result = discovered.outside()
+    (effect,) = result.effects
     assert effect.curve.title == "torque as a function of beta"
     # Seven waves a turn are in no library; the sign and the phase are the disk's.
     assert "sin(7 * beta" in effect.expression
     assert abs(abs(effect.parameters["a"]) - 0.03) < 4 * effect.errors["a"]
-    assert found.error_after.median[2] < 0.4 * found.error_before.median[2]
+    assert result.error_after.median[2] < 0.4 * result.error_before.median[2]
 
 
 def test_the_clock_may_start_anywhere():
@@ -200,8 +200,8 @@ def test_a_disk_without_drive_comes_to_rest():
 def test_two_effects_are_found():
     truth = udd.Disk(0.045, effects=[E.relaxation(b=5.0), E.quadratic_drag(c=4e-4)])
     measured, _states = simulated.film(truth, np.random.default_rng(8), 40.0)
-    found = udd.discover(measured, udd.Disk(0.045))
-    names = {f.effect.name for f in found.effects}
+    result = udd.discover(measured, udd.Disk(0.045))
+    names = {f.effect.name for f in result.effects}
     assert "quadratic_drag" in names
     assert names & {"relaxation", "slip"}
     assert len(names) == 2
@@ -231,27 +231,27 @@ def test_the_strongest_ripple_is_found_between_lines_too(shift):
     fitted = udd.fit(measured, udd.Disk(0.08))
     listed = ripples(fitted.model, fitted.record.t)
     best = max(scan_ripples(fitted, listed), key=lambda s: s.chi2)
-    found, comparisons = strongest_ripple(fitted)
+    result, comparisons = strongest_ripple(fitted)
     assert best.chi2 > 30.0
-    assert found is not None and found.candidate == best.candidate
+    assert result is not None and result.candidate == best.candidate
     assert comparisons == len(listed)
 
 
 def test_a_result_is_data():
-    found = discovered.disk()
-    text = json.dumps(found.to_dict(), allow_nan=True)
-    assert json.dumps(pickle.loads(pickle.dumps(found)).to_dict(), allow_nan=True) == text
-    assert json.loads(text)["effects"][0]["parameters"]["b"]["value"] == found.effects[0].parameters["b"]
-    assert found.model is found.fit.model
+    result = discovered.disk()
+    text = json.dumps(result.to_dict(), allow_nan=True)
+    assert json.dumps(pickle.loads(pickle.dumps(result)).to_dict(), allow_nan=True) == text
+    assert json.loads(text)["effects"][0]["parameters"]["b"]["value"] == result.effects[0].parameters["b"]
+    assert result.model is result.fit.model
 
 
 @pytest.mark.parametrize("duration", [20.0, 600.0])
 def test_ripples_lie_in_the_range_of_the_effect(duration):
     t = np.arange(0, duration, 0.04)
-    found = [c.effect.parameters["f"] for c in ripples(udd.Disk(0.04), t)]
-    assert found[0] == pytest.approx(max(2 / t[-1], 0.01))  # two turns, or what the effect calls its slowest
-    assert found[1] - found[0] == pytest.approx(0.5 / t[-1])
-    assert 5.9 < found[-1] < 6.0
+    result = [c.effect.parameters["f"] for c in ripples(udd.Disk(0.04), t)]
+    assert result[0] == pytest.approx(max(2 / t[-1], 0.01))  # two turns, or what the effect calls its slowest
+    assert result[1] - result[0] == pytest.approx(0.5 / t[-1])
+    assert 5.9 < result[-1] < 6.0
 
 
 def test_what_comes_nearest_is_told_but_not_added():
@@ -263,20 +263,20 @@ def test_what_comes_nearest_is_told_but_not_added():
     fade, turn = np.exp(-dt / 15.0), dt * np.sqrt(9.81 / length)
     swings = lfilter([1], [1, -2 * fade * np.cos(turn), fade**2], rng.standard_normal(len(t) + 500))[500:]
     noise = 5e-3 * rng.standard_normal(len(t)) + 0.02 * swings / swings.std()
-    found = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(length, k0=0.5))
-    assert found.verdict == "effect present, form not identified"
-    assert found.effects == []
-    assert found.ratio == (1.0, 1.0, 1.0)
-    assert {"quadratic drag", "cubic drag"} & {near.title for near in found.rejected}
-    for near in found.rejected:
-        assert near.why == "chance"
-        assert near.p >= confirmation.ALPHA
-        assert near.ratio[2] < 1.0
-        assert near.errors.whole < found.error_before.whole
-    assert [near["name"] for near in found.to_dict()["refused"]] == [n.effect.name for n in found.rejected]
-    assert "would bring the held-out error" in wording.rejected(found)[0]
-    twin = replace(found.rejected[0], title="its twin")
-    shared = wording.rejected(replace(found, rejected=[found.rejected[0], twin]))
+    result = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(length, k0=0.5))
+    assert result.verdict == "effect present, form not identified"
+    assert result.effects == []
+    assert result.ratio == (1.0, 1.0, 1.0)
+    assert {"quadratic drag", "cubic drag"} & {nearby.title for nearby in result.rejected}
+    for close in result.rejected:
+        assert close.why == "chance"
+        assert close.p >= confirmation.ALPHA
+        assert close.ratio[2] < 1.0
+        assert close.errors.whole < result.error_before.whole
+    assert [close_ones["name"] for close_ones in result.to_dict()["refused"]] == [n.effect.name for n in result.rejected]
+    assert "would bring the held-out error" in wording.rejected(result)[0]
+    twin = replace(result.rejected[0], title="its twin")
+    shared = wording.rejected(replace(result, rejected=[result.rejected[0], twin]))
     assert len(shared) == 1 and " or its twin (" in shared[0]  # the same errors: one sentence for both
 
 
@@ -302,14 +302,14 @@ def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most
     """loop.md: quadratic drag lowers the held-out error 1.8 to 7.4 times; Coulomb friction is rejected."""
     measured = udd.read_measurement(shared / f"data/real/string_pendulum_{name}.txt")
     measured = measured.rows(np.arange(0, len(measured), 2))  # the swing takes 2 s, a frame 67 ms
-    found = udd.discover(measured, udd.Pendulum(length, k0=0.01 * length**2))
-    assert [f.effect.name for f in found.effects] == ["quadratic_drag"]
-    assert {a.effect.name for a in found.alternatives} <= {"cubic_drag", "formula"}
-    assert found.ratio[2] < 1.0
-    assert found.ratio[0] < most
-    drag = found.effects[0].parameters["c"] / found.model.parameters["inertia"] / length
+    result = udd.discover(measured, udd.Pendulum(length, k0=0.01 * length**2))
+    assert [f.effect.name for f in result.effects] == ["quadratic_drag"]
+    assert {a.effect.name for a in result.alternatives} <= {"cubic_drag", "formula"}
+    assert result.ratio[2] < 1.0
+    assert result.ratio[0] < most
+    drag = result.effects[0].parameters["c"] / result.model.parameters["inertia"] / length
     if name == "b":  # whose pivot is off by a tenth of its length: 1.56 mrad where that is held as stated
-        assert found.error_after.whole < 1.4e-3
+        assert result.error_after.whole < 1.4e-3
     assert 0.013 < drag < 0.022  # one aerodynamic constant for all lengths, 0.014 to 0.021 there
 
 
@@ -318,8 +318,8 @@ def test_a_formula_that_free_runs_contradict_ends_the_search(shared):
     """A pendulum of a cup: its formula of Omega fits and foretells worse; nothing around it is better."""
     measured = udd.read_measurement(shared / "data/real/cup_pendulum.txt", columns="t,theta,_")
     said: list[str] = []
-    found = udd.discover(measured, udd.Pendulum(0.65, k0=0.01 * 0.65**2), progress=said.append)
-    assert [f.effect.name for f in found.effects] == ["cubic_drag"]
-    if [r.why for r in found.rejected] != ["unconfirmed"]:
+    result = udd.discover(measured, udd.Pendulum(0.65, k0=0.01 * 0.65**2), progress=said.append)
+    assert [f.effect.name for f in result.effects] == ["cubic_drag"]
+    if [r.why for r in result.rejected] != ["unconfirmed"]:
         pytest.skip("the symbolic regression, which rounds as the processor does, finds another formula here")
     assert not any("surfaces" in step for step in said)  # which took nine tenths of the time

@@ -30,8 +30,8 @@ def drifting(size: float) -> udd.Measurement:
 def test_a_drift_of_the_sensor_is_no_effect():
     measured = drifting(8e-3)
     assert udd.discover(measured, KNOWN).effects == []
-    known = fit_record(measured, record_of(measured), KNOWN, search=True)
-    assert drift_gain(known) > 300  # far beyond the price of its freedom
+    baseline = fit_record(measured, record_of(measured), KNOWN, search=True)
+    assert drift_gain(baseline) > 300  # far beyond the price of its freedom
 
 
 def test_a_steady_sensor_gains_nothing_by_a_drift():
@@ -58,11 +58,11 @@ def test_what_forces_at_random_explain_as_well_is_told_from_a_drag(shake, drag):
     measured = swinging(shake, drag)
     record = record_of(measured)
     braked = udd.Pendulum(0.8, k0=0.004, effects=[udd.effects.quadratic_drag(c=1e-3)])
-    known, found = (
+    baseline, result = (
         fit_record(measured, record, model, search=True) for model in (udd.Pendulum(0.8, k0=0.004), braked)
     )
-    assert known.level == found.level and known.chi2 - found.chi2 > 30  # either looks like a finding
-    assert (as_random(known, found) is not None) == bool(shake)
+    assert baseline.level == result.level and baseline.chi2 - result.chi2 > 30  # either looks like a finding
+    assert (as_random(baseline, result) is not None) == bool(shake)
 
 
 def test_a_search_takes_a_fit_that_is_near_its_minimum():

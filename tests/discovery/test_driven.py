@@ -32,17 +32,17 @@ def record(seed: int, drag: float) -> udd.Measurement:
 # Seed 1 asks the same.
 @pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.nightly), 1])
 def test_a_drag_is_named_beside_the_noise_of_the_torque(seed: int) -> None:
-    known = ARM.with_parameters({"J": 0.066, "weight": 0.95})
-    found = udd.discover(record(seed, 0.25), known)
-    (added,) = found.effects
-    assert found.verdict == "effect identified"
+    baseline = ARM.with_parameters({"J": 0.066, "weight": 0.95})
+    result = udd.discover(record(seed, 0.25), baseline)
+    (added,) = result.effects
+    assert result.verdict == "effect identified"
     assert added.effect.name == "abs_v_v_in_v"
     # Within 5 %: noise of the torque, a part in 200, and the arm's constants are free beside it.
     (value,) = added.effect.parameters.values()
     assert abs(value / -0.25 - 1.0) < 0.05
-    assert found.ratio[2] < 0.2
+    assert result.ratio[2] < 0.2
 
 
 def test_noise_of_the_torque_is_no_effect() -> None:
-    found = udd.discover(record(2, 0.0), ARM.with_parameters({"J": 0.066, "weight": 0.95}))
-    assert found.verdict == "nothing missing" and not found.effects
+    result = udd.discover(record(2, 0.0), ARM.with_parameters({"J": 0.066, "weight": 0.95}))
+    assert result.verdict == "nothing missing" and not result.effects

@@ -72,17 +72,17 @@ def test_a_free_number_does_not_come_before_the_right_law(law):
 
 def test_a_power_that_explains_hardly_more_is_not_tried_further():
     plain, truth = udd.Pendulum(0.5, k0=0.01), E.quadratic_drag(c=0.008)
-    found = scored(seen(plain.with_effects([truth]), duration=20.0), plain)
-    assert any(s.candidate.effect.name == "power_drag" for s in found.passing())
-    proposals = Proposals(found.fit, found, Clock(None, lambda _text: None))
-    tried = {t.candidates[0].effect.name for t in proposals._singles(found.passing())}
+    result = scored(seen(plain.with_effects([truth]), duration=20.0), plain)
+    assert any(s.candidate.effect.name == "power_drag" for s in result.passing())
+    proposals = Proposals(result.fit, result, Clock(None, lambda _text: None))
+    tried = {t.candidates[0].effect.name for t in proposals._singles(result.passing())}
     assert "quadratic_drag" in tried and not tried & {"power_drag", "threshold_drag", "local_brake"}
 
 
 def test_scanned_values_score_as_their_full_derivatives_do():
-    found = scores(E.local_brake(a=0.005, c=0.15, s=0.08))
-    strongest, number = strongest_shapes(found.fit)
-    listed = {s.candidate: s for s in found.library.scored}
+    result = scores(E.local_brake(a=0.005, c=0.15, s=0.08))
+    strongest, number = strongest_shapes(result.fit)
+    listed = {s.candidate: s for s in result.library.scored}
     assert len(strongest) == 5
     assert {s.candidate.effect.name for s in strongest} == {
         "local_brake",
@@ -91,19 +91,19 @@ def test_scanned_values_score_as_their_full_derivatives_do():
         "warming_friction",
     }
     assert number > 40
-    for one in strongest:
+    for item in strongest:
         # Within a frame the motion is followed at a few places.
-        assert one.chi2 == pytest.approx(listed[one.candidate].chi2, rel=1e-3, abs=1e-2)
+        assert item.chi2 == pytest.approx(listed[item.candidate].chi2, rel=1e-3, abs=1e-2)
     brake = next(s for s in strongest if s.candidate.effect.name == "local_brake")
     assert abs(brake.candidate.effect.parameters["c"] - 0.15) < 0.1
 
 
 def test_a_fit_gives_a_brake_s_place_and_width():
     plain = udd.Pendulum(0.5, k0=0.01)
-    found = scored(seen(plain.with_effects([E.local_brake(a=0.05, c=0.15, s=0.08)])), plain)
+    result = scored(seen(plain.with_effects([E.local_brake(a=0.05, c=0.15, s=0.08)])), plain)
     # A place on the other side is tried too: a symmetric swing passes both alike.
-    first, second = (s for s in found.usable() if s.candidate.effect.name == "local_brake")
-    trials = [of_library(found.fit, [s.candidate], list(s.amplitudes)) for s in (first, second)]
+    first, second = (s for s in result.usable() if s.candidate.effect.name == "local_brake")
+    trials = [of_library(result.fit, [s.candidate], list(s.amplitudes)) for s in (first, second)]
     trial = min((t for t in trials if t), key=lambda t: t.rank)
     assert first.candidate.parameters == 3
     for name, value in (("a", 0.05), ("c", 0.15), ("s", 0.08)):
@@ -134,8 +134,8 @@ def test_the_same_laws_are_tried_in_models_of_one_s_own(term, size, title):
     t = np.arange(0, 24, 0.05)
     theta = udd.simulate(truth, t, [1.0, 0.0]).theta
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
-    found = scored(udd.Measurement(t, {"theta": theta + noise}), OWN)
-    assert best_of(found, title) > 0.99
+    result = scored(udd.Measurement(t, {"theta": theta + noise}), OWN)
+    assert best_of(result, title) > 0.99
 
 
 def test_a_cart_s_places_are_within_its_way():

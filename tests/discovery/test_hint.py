@@ -43,45 +43,45 @@ def test_evidence_is_said_as_odds():
 
 
 def test_a_second_drive_is_proposed_for_slip_or_relaxation():
-    _measured, found = relaxed()
-    assert any("slip" in other.title for other in found.alternatives)
-    assert found.hint is not None and "times the drive" in found.hint.design
-    assert any("slip" in title for title in found.hint.parts)
-    assert found.hint.nats >= SEPARATED
+    _measured, result = relaxed()
+    assert any("slip" in other.title for other in result.alternatives)
+    assert result.hint is not None and "times the drive" in result.hint.design
+    assert any("slip" in title for title in result.hint.parts)
+    assert result.hint.nats >= SEPARATED
     # Neither another start nor a longer film at the one drive would tell.
-    telling = [hint for hint in found.hints if any("slip c Z" in title for title in hint.parts)]
+    telling = [hint for hint in result.hints if any("slip c Z" in title for title in hint.parts)]
     assert all("times the drive" in hint.design for hint in telling)
-    assert found.hint.text in as_text(summary_of(found))
-    json.dumps([hint.to_dict() for hint in found.hints])
+    assert result.hint.text in as_text(summary_of(result))
+    json.dumps([hint.to_dict() for hint in result.hints])
 
 
 def test_the_proposed_film_parts_them():
-    measured, found = relaxed()
-    times = float(found.hint.design.split("with ")[1].split(" times")[0])
+    measured, result = relaxed()
+    times = float(result.hint.design.split("with ")[1].split(" times")[0])
     both = udd.discover([measured, second(times)], [udd.Disk(DRIVE), udd.Disk(times * DRIVE)])
     assert [effect.effect.name for effect in both.effects] == ["relaxation"]
     assert not any("slip c Z" in other.title for other in both.alternatives)
 
 
 def test_what_a_film_is_expected_to_tell_is_what_it_tells():
-    measured, found = relaxed()
-    slip = next(other for other in found.alternatives if "slip" in other.title)
-    said, told = [], []
+    measured, result = relaxed()
+    slip = next(other for other in result.alternatives if "slip" in other.title)
+    said, reported = [], []
     for times in (0.5, 0.7, 1.4, 2.0):
-        hint = next(h for h in found.hints if f"with {times:g} times" in h.design)
+        hint = next(h for h in result.hints if f"with {times:g} times" in h.design)
         said.append(hint.each[slip.title])
         films = [measured, second(times)]
         record = record_of(films)
         record = record.part(record.first(0.6))
         fits = [
             fit_record(films, record, [udd.Disk(w, effects=[e]) for w in (DRIVE, times * DRIVE)], search=True)
-            for e in (found.effects[0].effect, slip.effect)
+            for e in (result.effects[0].effect, slip.effect)
         ]
         level = min(fitted.level for fitted in fits)
         right, wrong = (at_level(fitted, level) for fitted in fits)
-        told.append((wrong.chi2 - right.chi2) / 2 / max(right.scatter, 1.0))
+        reported.append((wrong.chi2 - right.chi2) / 2 / max(right.scatter, 1.0))
     # Half a chi2's rise of n nats scatters by sqrt(2 n), and another start tells up to twice as much or half.
-    assert 0.5 < sum(told) / sum(said) < 2.0, (said, told)
+    assert 0.5 < sum(reported) / sum(said) < 2.0, (said, reported)
 
 
 def test_nothing_is_proposed_where_nothing_is_in_doubt():
@@ -90,12 +90,12 @@ def test_nothing_is_proposed_where_nothing_is_in_doubt():
 
 def test_a_weak_doubt_that_no_film_settles_is_said_so():
     """Forms so weak that no film tells them apart are left open in so many words."""
-    _measured, found = relaxed()
-    slip = next(other for other in found.alternatives if "slip" in other.title)
-    trained, effect = found.trained, found.effects[0].effect
+    _measured, result = relaxed()
+    slip = next(other for other in result.alternatives if "slip" in other.title)
+    trained, effect = result.trained, result.effects[0].effect
     weak = [m.with_parameters({f"{effect.name}.b": 0.02}) for m in trained.models]
     faint = replace(
-        found,
+        result,
         trained=replace(trained, models=tuple(weak)),
         alternatives=[replace(slip, effect=slip.effect.replace(c=0.02 * DRIVE))],
     )

@@ -109,8 +109,8 @@ def test_hypotheses_come_in_order_of_their_log_evidence():
 
 def test_rivals_are_what_lies_within_ten_nats():
     chosen = hypothesis(100.0, QUADRATIC)
-    near, far = hypothesis(91.0, CUBIC), hypothesis(89.0, COULOMB)
-    assert rivals(chosen, [chosen, near, far], KNOWN) == [near]
+    close, far = hypothesis(91.0, CUBIC), hypothesis(89.0, COULOMB)
+    assert rivals(chosen, [chosen, close, far], KNOWN) == [close]
 
 
 def test_a_wider_law_is_a_rival_only_if_it_gains():
@@ -189,9 +189,9 @@ def test_log_evidence_of_a_fit_with_a_drag_is_near_the_information_criterion():
     right = extend(plain, [udd.effects.quadratic_drag()], [0.0])
     idle = extend(right, [udd.effects.constant_torque()], [0.0])
     names = ["quadratic_drag.c"]
-    without, one, two = refit(plain), refit(right), refit(idle)
-    assert log_evidence(one, names) > log_evidence(without, []) + 50
-    lost = log_evidence(one, names) - log_evidence(two, [*names, "constant_torque.c"])
+    without, item, two = refit(plain), refit(right), refit(idle)
+    assert log_evidence(item, names) > log_evidence(without, []) + 50
+    lost = log_evidence(item, names) - log_evidence(two, [*names, "constant_torque.c"])
     # What a number that is not needed costs: half the logarithm of the record's numbers, less a chi2 of 1.
     assert math.log(len(t)) / 2 - 3.5 < lost < math.log(len(t)) / 2 + 1.0
 

@@ -19,8 +19,8 @@ def sliding(t: np.ndarray, x: float, w: float, dry: float) -> np.ndarray:
     result, begin, hold = np.empty(len(t)), 0.0, dry / w**2
     while abs(x) > hold and begin <= t[-1]:
         centre = np.sign(x) * hold
-        own = t >= begin
-        result[own] = centre + (x - centre) * np.cos(w * (t[own] - begin))
+        each = t >= begin
+        result[each] = centre + (x - centre) * np.cos(w * (t[each] - begin))
         begin, x = begin + np.pi / w, 2 * centre - x
     result[t >= begin] = x
     return result
@@ -53,11 +53,11 @@ def test_a_mass_that_slides_on_metal_has_dry_friction():
     x = sliding(t, 0.1, 6.3, 0.1)
     assert np.ptp(x[-50:]) == 0.0  # it rests at last, off the middle
     seen = x + 2e-4 * np.random.default_rng(0).standard_normal(len(t))
-    found = udd.discover(udd.Measurement(t, {"x": seen}), SPRING)
-    assert found.verdict == "effect identified"
-    assert [f.effect.name for f in found.effects] == ["dry_v_in_v"]
-    assert found.effects[0].parameters["c1"] == pytest.approx(-0.1, rel=0.05)
-    assert found.ratio[2] < 1.0
+    result = udd.discover(udd.Measurement(t, {"x": seen}), SPRING)
+    assert result.verdict == "effect identified"
+    assert [f.effect.name for f in result.effects] == ["dry_v_in_v"]
+    assert result.effects[0].parameters["c1"] == pytest.approx(-0.1, rel=0.05)
+    assert result.ratio[2] < 1.0
 
 
 def test_modes_are_those_of_the_linearised_model_and_the_motions_own():
@@ -67,9 +67,9 @@ def test_modes_are_those_of_the_linearised_model_and_the_motions_own():
     assert modes(carts, t, run) == pytest.approx(np.array([1.0, np.sqrt(3.0)]) / (2 * np.pi), rel=1e-6)
     swing = udd.Model(["a", "v"], {"a": "v", "v": "-9*sin(a)"}, angles=["a"])
     wide = udd.simulate(swing, t, [1.5, 0.0]).state
-    found = modes(swing, t, wide)
+    result = modes(swing, t, wide)
     # A swing of 1.5 rad takes 1.16 times as long as a small one; a line of the record is 1/60 s.
-    assert len(found) == 2 and found[0] == pytest.approx(found[1] / 1.16, abs=1 / 60 / 2)
+    assert len(result) == 2 and result[0] == pytest.approx(result[1] / 1.16, abs=1 / 60 / 2)
 
 
 def test_no_drive_is_told_at_a_systems_own_frequencies_or_the_mains():
@@ -77,9 +77,11 @@ def test_no_drive_is_told_at_a_systems_own_frequencies_or_the_mains():
     run = udd.simulate(SPRING, t, [0.1, 0.0]).state
     seen = run[:, 0] + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
     fit = udd.fit(udd.Measurement(t, {"x": seen}), SPRING)
-    own = np.sqrt(39.0) / (2 * np.pi)
+    each = np.sqrt(39.0) / (2 * np.pi)
     # Hum of 60 Hz at 50 frames a second is seen at 10 Hz.
-    asked = np.array([own, 2 * own, 4 * own, 50.0, 60.0, 10.0, 1.5 * own, 0.5 * own, 7 * own, 48.0, 9.0])
+    asked = np.array(
+        [each, 2 * each, 4 * each, 50.0, 60.0, 10.0, 1.5 * each, 0.5 * each, 7 * each, 48.0, 9.0]
+    )
     assert belongs(asked, fit).tolist() == [True] * 6 + [False] * 5
 
 
@@ -89,13 +91,13 @@ def test_two_frictions_are_found_together_where_one_would_do_for_the_first_part(
     drags = [udd.effects.quadratic_drag(c=0.02), udd.effects.coulomb(c=0.01)]
     truth = udd.Pendulum(0.8, k0=0.004, effects=drags)
     theta = udd.simulate(truth, t, [0.0, 0.8]).state[:, 1]
-    found = udd.discover(
+    result = udd.discover(
         udd.Measurement(t, {"theta": np.round(theta / step) * step}), udd.Pendulum(0.8, k0=0.004)
     )
-    assert {f.effect.name for f in found.effects} == {"quadratic_drag", "coulomb"}
-    values = {f.effect.name: f.parameters["c"] for f in found.effects}
+    assert {f.effect.name for f in result.effects} == {"quadratic_drag", "coulomb"}
+    values = {f.effect.name: f.parameters["c"] for f in result.effects}
     assert values == pytest.approx({"quadratic_drag": 0.02, "coulomb": 0.01}, rel=0.1)
-    assert found.error_after.whole < 2 * found.error_after.floor[-1]
+    assert result.error_after.whole < 2 * result.error_after.floor[-1]
 
 
 def test_mere_products_and_several_terms_pay_more():

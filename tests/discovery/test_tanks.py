@@ -37,14 +37,14 @@ def tanks(leak: float, seed: int) -> udd.Measurement:
 @pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.nightly)])
 def test_a_leak_of_the_lower_tank_is_found_with_the_hidden_start(seed: int) -> None:
     """A slow drift of the gauge would explain the misfit as well, were it as fast as the level itself."""
-    found = udd.discover(tanks(0.008, seed), LAW)
-    assert [f.effect.name for f in found.effects] == ["b_in_b"]
-    assert abs(found.fit.parameters["b_in_b.c"] + 0.008) < 4 * found.fit.errors["b_in_b.c"]
-    assert abs(found.fit.states[0, 0] - 2.5) < 4 * np.sqrt(found.fit.state_covariance[0, 0, 0])
-    assert found.error_after.whole < 0.4 * found.error_before.whole
+    result = udd.discover(tanks(0.008, seed), LAW)
+    assert [f.effect.name for f in result.effects] == ["b_in_b"]
+    assert abs(result.fit.parameters["b_in_b.c"] + 0.008) < 4 * result.fit.errors["b_in_b.c"]
+    assert abs(result.fit.states[0, 0] - 2.5) < 4 * np.sqrt(result.fit.state_covariance[0, 0, 0])
+    assert result.error_after.whole < 0.4 * result.error_before.whole
 
 
 def test_tanks_that_lack_nothing_are_left_alone() -> None:
-    found = udd.discover(tanks(0.0, 1), LAW)
-    assert found.verdict == "nothing missing"
-    assert abs(found.fit.states[0, 0] - 2.5) < 4 * np.sqrt(found.fit.state_covariance[0, 0, 0])
+    result = udd.discover(tanks(0.0, 1), LAW)
+    assert result.verdict == "nothing missing"
+    assert abs(result.fit.states[0, 0] - 2.5) < 4 * np.sqrt(result.fit.state_covariance[0, 0, 0])

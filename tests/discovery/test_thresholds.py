@@ -31,13 +31,13 @@ def test_a_delay_is_found() -> None:
     torque = 0.4 * drive(t, 1)
     run = udd.simulate(late, t, [0.3, 0.0], inputs={"torque": torque})
     seen = run.q + 1e-3 * np.random.default_rng(2).normal(size=len(t))
-    known = ARM.replace(J=0.055, weight=0.95)
-    found = udd.discover(udd.Measurement(t, {"q": seen}, inputs={"torque": torque}), known)
-    assert found.verdict == "effect identified"
-    (added,) = found.effects
+    baseline = ARM.replace(J=0.055, weight=0.95)
+    result = udd.discover(udd.Measurement(t, {"q": seen}, inputs={"torque": torque}), baseline)
+    assert result.verdict == "effect identified"
+    (added,) = result.effects
     assert added.title == "delay of torque"
     (tau,) = added.effect.values
-    error = found.fit.errors["delay_of_torque.tau"]
+    error = result.fit.errors["delay_of_torque.tau"]
     # A pull of more than four standard errors happens by chance in 6 of 100,000 draws.
     assert abs(tau - 0.03) < 4 * error
     assert error < 1e-3
@@ -45,19 +45,19 @@ def test_a_delay_is_found() -> None:
 
 def test_a_spring_with_play_is_found() -> None:
     t = np.arange(0, 16, 0.02)
-    known = udd.Model(
+    baseline = udd.Model(
         ["x", "v"], ["v", "gain*u - k*x - c*v"], {"gain": 1.0, "k": 5.0, "c": 0.4}, inputs=["u"]
     )
-    true = known.with_term("v", "max(x - 0.08, 0) + min(x + 0.08, 0)", stiff=-12.0)
+    true = baseline.with_term("v", "max(x - 0.08, 0) + min(x + 0.08, 0)", stiff=-12.0)
     u = 0.8 * drive(t, 3)
     run = udd.simulate(true, t, [0.05, 0.0], inputs={"u": u})
     seen = run.x + 5e-4 * np.random.default_rng(4).normal(size=len(t))
-    found = udd.discover(udd.Measurement(t, {"x": seen}, inputs={"u": u}), known.replace(gain=1.1, k=6.0))
-    (added,) = found.effects
+    result = udd.discover(udd.Measurement(t, {"x": seen}, inputs={"u": u}), baseline.replace(gain=1.1, k=6.0))
+    (added,) = result.effects
     assert added.title == "dead zone of x in v'"
     stiffness, play = added.effect.values
-    assert abs(stiffness + 12.0) < 4 * found.fit.errors["dead_zone_of_x_in_v.c1"]
-    assert abs(play - 0.08) < 4 * found.fit.errors["dead_zone_of_x_in_v.b"]
+    assert abs(stiffness + 12.0) < 4 * result.fit.errors["dead_zone_of_x_in_v.c1"]
+    assert abs(play - 0.08) < 4 * result.fit.errors["dead_zone_of_x_in_v.b"]
 
 
 @pytest.mark.parametrize(
@@ -73,11 +73,11 @@ def test_what_a_motor_does_not_give_is_found(kind: str, gone: str) -> None:
     torque = 0.4 * drive(t, 5)
     run = udd.simulate(ARM.with_term("v", gone, less=-20.0), t, [0.3, 0.0], inputs={"torque": torque})
     seen = run.q + 1e-3 * np.random.default_rng(6).normal(size=len(t))
-    known = ARM.replace(J=0.055, weight=0.95)
-    found = udd.discover(udd.Measurement(t, {"q": seen}, inputs={"torque": torque}), known)
-    (added,) = found.effects
+    baseline = ARM.replace(J=0.055, weight=0.95)
+    result = udd.discover(udd.Measurement(t, {"q": seen}, inputs={"torque": torque}), baseline)
+    (added,) = result.effects
     assert added.title == f"{kind} of torque in v'"
-    errors = [found.fit.errors[f"{added.effect.name}.{name}"] for name in added.effect.parameters]
+    errors = [result.fit.errors[f"{added.effect.name}.{name}"] for name in added.effect.parameters]
     for value, error, true in zip(
         added.effect.values, errors, (-20.0, 0.3 if kind == "dead zone" else 0.5), strict=True
     ):

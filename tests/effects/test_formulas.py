@@ -41,9 +41,9 @@ T = np.linspace(0.0, 5.0, 50)
     ids=lambda effect: effect.name,
 )
 def test_a_formula_acts_as_the_librarys_effect_does(library: Effect, own: Effect) -> None:
-    wanted, found = (udd.Disk(0.05, effects=[effect]).rates(T, X) for effect in (library, own))
+    wanted, result = (udd.Disk(0.05, effects=[effect]).rates(T, X) for effect in (library, own))
     # Roundings of the same sums in another order.
-    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(result, wanted, rtol=1e-12, atol=1e-13)
 
 
 def test_a_formula_goes_wherever_an_effect_goes() -> None:
@@ -71,18 +71,18 @@ def test_a_formula_goes_wherever_an_effect_goes() -> None:
         assert model_from_dict(json.loads(json.dumps(model_to_dict(model)))) == model
     # One pendulum and one name serve too.
     drag = formula("torque", "-c*Omega^3", c=0.1)
-    own, library = (
+    each, library = (
         udd.Pendulum(0.5, effects=e).rates(0.0, X[:, :2]) for e in (drag, effects.cubic_drag(c=0.1))
     )
-    np.testing.assert_allclose(own, library, rtol=1e-12)
+    np.testing.assert_allclose(each, library, rtol=1e-12)
 
 
 def test_a_run_with_a_formula_is_that_with_the_librarys_effect() -> None:
     start, end = [1.0, 0.01, -0.02, 0.3], 3.0
     library = effects.relaxation(b=3.0, momentum="consistent"), effects.quadratic_drag(c=1e-3)
-    own = formula("vertical", "-b*W*Z", name="own", b=3.0), formula("torque", "-c*abs(Omega)*Omega", c=1e-3)
+    each = formula("vertical", "-b*W*Z", name="own", b=3.0), formula("torque", "-c*abs(Omega)*Omega", c=1e-3)
     for method in ("dopri5", "taylor"):
-        runs = [udd.simulate(udd.Disk(0.05, effects=e), end, start, method=method) for e in (library, own)]
+        runs = [udd.simulate(udd.Disk(0.05, effects=e), end, start, method=method) for e in (library, each)]
         # The same steps but for roundings, which chaos lets grow over 3 s by less than a thousand.
         np.testing.assert_allclose(runs[0].state[-1], runs[1].state[-1], rtol=1e-9, atol=1e-11)
         assert runs[0].events.kind == runs[1].events.kind and len(runs[0].events) > 3
@@ -197,25 +197,25 @@ def test_a_fit_finds_a_formulas_numbers_as_the_librarys_effects() -> None:
     theta = udd.simulate(truth, t, [0.0, 1.5]).state[:, 1]
     seen = udd.Measurement(t, theta + 1e-3 * np.random.default_rng(1).standard_normal(len(t)))
     free = ["k0"]
-    library, own = (
+    library, each = (
         udd.fit(seen, udd.Pendulum(1.0, k0=0.01, effects=effect), free=[*free, f"{effect.name}.c"])
         for effect in (effects.quadratic_drag(), formula("torque", "-c*abs(Omega)*Omega", name="own", c=0.0))
     )
     # The same problem, solved to a part in 1e6 of the errors or so.
-    for a, b in zip(library.parameters.values(), own.parameters.values(), strict=True):
+    for a, b in zip(library.parameters.values(), each.parameters.values(), strict=True):
         assert a == pytest.approx(b, rel=1e-5)
-    assert abs(own.parameters["own.c"] - 0.05) < 4.0 * own.errors["own.c"]
+    assert abs(each.parameters["own.c"] - 0.05) < 4.0 * each.errors["own.c"]
     # A curve over the speed takes the place of both frictions.
     bend = curve("torque", "Omega", -4.5, 4.5, np.zeros(8))
     # The pivot is known here: were it not, an even torque could be its fault.
     free = [f"curve.{c}" for c in bend.amplitudes]
-    found = udd.fit(seen, udd.Pendulum(1.0, effects=bend), free=free, camera=["theta0"])
+    result = udd.fit(seen, udd.Pendulum(1.0, effects=bend), free=free, camera=["theta0"])
     speed = np.linspace(-3.0, 3.0, 7)
     basis = bend.spec.basis(speed)  # type: ignore[attr-defined]
-    order = list(found.parameters)
-    coefficients = np.array(list(found.parameters.values()))
+    order = list(result.parameters)
+    coefficients = np.array(list(result.parameters.values()))
     places = [order.index(f"curve.{c}") for c in bend.amplitudes]
-    covariance = found.covariance[np.ix_(places, places)]
+    covariance = result.covariance[np.ix_(places, places)]
     error = np.sqrt(np.einsum("ki,ij,kj->k", basis, covariance, basis))
     wanted = -0.01 * speed - 0.05 * np.abs(speed) * speed
     # That a spline bends where the drag's curvature jumps is less than the error.

@@ -102,9 +102,9 @@ def test_treatments_come_to_the_set_valued_law(treatment: str) -> None:
         return udd.simulate(model, [0.0, 8.0], start, **TIGHT).state[-1, :2]
 
     exact = end("set-valued", 0.05)
-    far, near = (np.abs(end(treatment, eps) - exact).max() for eps in (4e-3, 2.5e-4))
+    far, close = (np.abs(end(treatment, eps) - exact).max() for eps in (4e-3, 2.5e-4))
     # In the root of the width at least.
-    assert near < far / 3.5 + 1e-12 and near < 0.02
+    assert close < far / 3.5 + 1e-12 and close < 0.02
 
 
 def test_stribeck_friction_sticks_by_its_size_at_rest() -> None:
@@ -193,5 +193,5 @@ def test_fits_take_smoothed_friction_only(treatment: str) -> None:
 def test_the_command_line_has_the_choice(capsys: pytest.CaptureFixture[str]) -> None:
     argv = ["simulate", "--pendulum", "0.5", "--effect", "coulomb:c=0.05,treatment=set-valued", "--json"]
     assert main([*argv, "--state", "0,0.1", "--t", "20"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["state"][-1][0] == 0.0
+    result = json.loads(capsys.readouterr().out)
+    assert result["state"][-1][0] == 0.0

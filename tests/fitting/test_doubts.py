@@ -40,10 +40,10 @@ def fitted(hidden: str | None, seed: int) -> udd.Fit:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_a_right_model_is_not_doubted(seed):
-    found = fitted(None, seed)
-    assert not found.doubts.missing and found.doubts.tight and found.doubts.factor == 1.0
-    assert found.doubts.ran_off == [] and not found.doubts.coloured
-    assert "no sign that something is missing" in str(found)
+    result = fitted(None, seed)
+    assert not result.doubts.missing and result.doubts.tight and result.doubts.factor == 1.0
+    assert result.doubts.ran_off == [] and not result.doubts.coloured
+    assert "no sign that something is missing" in str(result)
 
 
 @pytest.mark.parametrize("W", [0.03, 0.042, 0.05])
@@ -53,34 +53,34 @@ def test_a_plain_disk_lacks_nothing_however_well_it_is_seen(W, part):
     noise = part * np.array([1e-4, 1e-4, 1e-3])
     run = udd.simulate(udd.Disk(W), np.arange(0, 20, 0.04), [2, 0.02, -0.02, 0])
     seen = run.state[:, 1:4] + noise * np.random.default_rng(0).standard_normal((len(run.t), 3))
-    found = udd.fit(udd.Measurement(run.t, seen), udd.Disk(W))
-    assert not found.doubts.missing
+    result = udd.fit(udd.Measurement(run.t, seen), udd.Disk(W))
+    assert not result.doubts.missing
     # Of 500 frames the scatter is known to 3 %; three of it, and what the states follow.
-    assert [one.noise for one in found.doubts.sensor] == pytest.approx(noise, rel=0.12)
+    assert [item.noise for item in result.doubts.sensor] == pytest.approx(noise, rel=0.12)
 
 
 def test_a_search_finds_nothing_missing_in_a_plain_disk_that_is_seen_precisely():
     run = udd.simulate(udd.Disk(0.042), np.arange(0, 40, 0.04), [2, 0.02, -0.02, 0])
     noise = np.random.default_rng(1).standard_normal((len(run.t), 3)) * [1e-4, 1e-4, 1e-3]
-    found = udd.discover(udd.Measurement(run.t, run.state[:, 1:4] + noise), udd.Disk(0.042))
-    assert found.verdict == "nothing missing" and found.baseline.scatter < 1.2
+    result = udd.discover(udd.Measurement(run.t, run.state[:, 1:4] + noise), udd.Disk(0.042))
+    assert result.verdict == "nothing missing" and result.baseline.scatter < 1.2
 
 
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_a_model_that_lacks_something_says_so(hidden, tmp_path: Path, capsys):
-    found = fitted(hidden, 1)
-    assert found.doubts.missing and found.doubts.factor > 10
-    text = found.summary()
+    result = fitted(hidden, 1)
+    assert result.doubts.missing and result.doubts.factor > 10
+    text = result.summary()
     assert text.splitlines()[1] == "something is missing: run udd discover"
     assert "the model misses angular accelerations of" in text and "rad/s^2" in text
     assert "+- " in text and "m^2/s" in text and len(text.splitlines()) < 30
-    assert "something is missing: run udd discover" in found._repr_html_()
-    assert found.to_dict()["doubts"]["missing"] is True
+    assert "something is missing: run udd discover" in result._repr_html_()
+    assert result.to_dict()["doubts"]["missing"] is True
     # The errors contain the doubt, the covariance with them.
     truth = {"k0": 0.012, "k1": 0.103, "k2": 0.055, "W": DRIVE}
     for name, value in truth.items():
-        assert abs(found.parameters[name] - value) < 3 * found.errors[name], name
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), list(found.errors.values()))
+        assert abs(result.parameters[name] - value) < 3 * result.errors[name], name
+    np.testing.assert_allclose(np.sqrt(np.diag(result.covariance)), list(result.errors.values()))
 
 
 def test_the_command_says_it_too(tmp_path: Path, capsys):
@@ -97,19 +97,19 @@ def test_parameters_that_run_off_are_told():
     theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.6]).state[:, 1]
     measured = udd.Measurement(t, {"theta": theta + 2e-3 * rng.standard_normal(len(t))})
     assert udd.fit(measured, udd.Pendulum(1.02, k0=0.1)).doubts.ran_off == []
-    told = udd.fit(measured, udd.Pendulum(1.5, k0=0.1), priors={"inertia": (2.25, 0.02)})
-    (length,) = [one for one in told.doubts.ran_off if one.name == "length"]
+    reported = udd.fit(measured, udd.Pendulum(1.5, k0=0.1), priors={"inertia": (2.25, 0.02)})
+    (length,) = [item for item in reported.doubts.ran_off if item.name == "length"]
     assert length.stated == 1.5 and abs(length.value - length.stated) > 3 * length.sd
-    assert "warning: length = " in told.summary() and "standard deviations off" in told.summary()
+    assert "warning: length = " in reported.summary() and "standard deviations off" in reported.summary()
 
 
 def test_friction_that_drives_is_told():
     t = np.arange(0, 40, 0.05)
     theta = 0.2 * np.exp(0.01 * t) * np.cos(3.13 * t)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(len(t))
-    found = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.02))
-    assert found.parameters["k0"] < 0
-    assert "expected a positive value" in found.summary()
+    result = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.02))
+    assert result.parameters["k0"] < 0
+    assert "expected a positive value" in result.summary()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -117,12 +117,12 @@ def test_friction_that_drives_is_told():
 def test_a_model_of_ones_own_is_doubted_where_it_lacks_something(seed, lacking):
     t = np.arange(0, 40, 0.05)
     equations = {"x": "v", "v": "-k*x - c*v"}
-    known = udd.Model(["x", "v"], equations, {"k": 9.0, "c": 0.1})
+    baseline = udd.Model(["x", "v"], equations, {"k": 9.0, "c": 0.1})
     truth = udd.Model(["x", "v"], equations | {"v": equations["v"] + lacking}, {"k": 9.0, "c": 0.1})
     x = udd.simulate(truth, t, [1.0, 0.0]).state[:, 0]
     seen = x + 5e-3 * np.random.default_rng(seed).standard_normal(len(t))
-    found = udd.fit(udd.Measurement(t, {"x": seen}), known)
-    assert found.doubts.missing == bool(lacking)
+    result = udd.fit(udd.Measurement(t, {"x": seen}), baseline)
+    assert result.doubts.missing == bool(lacking)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -132,8 +132,8 @@ def test_a_pendulum_is_doubted_where_it_lacks_something(seed, drag):
     effects = [E.quadratic_drag(c=drag)] if drag else []
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01, effects=effects), t, [0.0, 0.7]).state[:, 1]
     seen = theta + 2e-3 * np.random.default_rng(seed).standard_normal(len(t))
-    found = udd.fit(udd.Measurement(t, {"theta": seen}), udd.Pendulum(0.8, k0=0.02))
-    assert found.doubts.missing == bool(drag)
+    result = udd.fit(udd.Measurement(t, {"theta": seen}), udd.Pendulum(0.8, k0=0.02))
+    assert result.doubts.missing == bool(drag)
 
 
 def test_a_film_whose_disk_has_come_to_rest_repeats_its_picture():
@@ -161,14 +161,14 @@ def test_a_film_whose_disk_has_come_to_rest_repeats_its_picture():
 def test_the_last_digits_of_exact_data_are_no_missing_effect(digits, sensors):
     """What is left is coloured, by the integrator or by rounding; a search finds nothing in it either."""
     t = np.arange(0, 20, 0.05)
-    known = udd.Model(["x", "v"], ["v", "-k*x - c*v"], {"k": 9.0, "c": 0.1})
-    states = udd.simulate(known, t, [1.0, 0.0]).state
+    baseline = udd.Model(["x", "v"], ["v", "-k*x - c*v"], {"k": 9.0, "c": 0.1})
+    states = udd.simulate(baseline, t, [1.0, 0.0]).state
     seen = states if digits is None else np.round(states, digits)
-    record = udd.Measurement(t, dict(zip(known.state_names[:sensors], seen.T, strict=False)))
-    found = udd.fit(record, known.with_parameters({"k": 8.5, "c": 0.12}))
-    assert not found.doubts.missing and "as a right model does" in found.summary()
+    record = udd.Measurement(t, dict(zip(baseline.state_names[:sensors], seen.T, strict=False)))
+    result = udd.fit(record, baseline.with_parameters({"k": 8.5, "c": 0.12}))
+    assert not result.doubts.missing and "as a right model does" in result.summary()
     if digits == 6:
-        assert udd.discover(record, known).verdict == "nothing missing"
+        assert udd.discover(record, baseline).verdict == "nothing missing"
 
 
 @pytest.mark.parametrize("plain", [udd.Pendulum(0.8, k0=0.01), udd.Disk(0.042)])
@@ -183,13 +183,13 @@ def test_colour_alone_does_not_tell_a_film_s_faults_from_what_is_missing():
     """An error of half the noise that comes and goes three times a second, as marks on a wheel would."""
     clean, _states = simulated.film(udd.Disk(DRIVE), np.random.default_rng(2), 60.0)
     fault = 2.5e-4 * np.sin(2 * np.pi * 3.1 * clean.t)[:, None] * [1.0, 1.0, 0.0]
-    told = []
+    reported = []
     for meta in ({}, {"px_per_m": 1750.0}):
         seen = udd.Measurement(clean.t, clean.values + fault, meta=meta)
         doubts = udd.fit(seen, udd.Disk(DRIVE)).doubts
-        told.append((doubts.tight, bool(doubts.coloured), doubts.missing, doubts.verdict.split(",")[0]))
-    assert told[0] == (True, True, True, "something is missing: run udd discover")
-    assert told[1] == (True, True, False, "residuals are not white")
+        reported.append((doubts.tight, bool(doubts.coloured), doubts.missing, doubts.verdict.split(",")[0]))
+    assert reported[0] == (True, True, True, "something is missing: run udd discover")
+    assert reported[1] == (True, True, False, "residuals are not white")
 
 
 def test_an_encoder_has_a_zero_but_no_perspective():
@@ -214,4 +214,4 @@ def test_steps_that_no_other_noise_blurs_are_told(other: float, told: list[str])
         )
     sigma = np.tile([np.hypot(other, 12**-0.5) * step] * 2 + [0.01], (len(values), 1))
     fitted = udd.fit(udd.Measurement(measured.t, values, sigma=sigma), udd.Disk(0.045))
-    assert [one.name for one in readings(fitted) if one.coarse] == told
+    assert [item.name for item in readings(fitted) if item.coarse] == told

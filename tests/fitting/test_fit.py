@@ -80,10 +80,10 @@ def test_the_noise_is_found(fits):
         assert f.converged
         assert 0.9 < f.scatter < 1.3  # 1 % of outliers at 8 sigma add to it
         speed = np.array([0.0, 4.0, 10.0])
-        found = np.hypot(f.noise.factor[0] * 5e-4, f.noise.blur[0] * speed)
+        result = np.hypot(f.noise.factor[0] * 5e-4, f.noise.blur[0] * speed)
         truth = camera.noise + camera.per_speed * speed
         # A thousand frames give 3 %; the law is a sum in the truth and a root of squares in the model.
-        np.testing.assert_allclose(found, truth, rtol=0.25)
+        np.testing.assert_allclose(result, truth, rtol=0.25)
 
 
 def test_a_lens_bends_about_the_picture_s_middle():
@@ -92,8 +92,8 @@ def test_a_lens_bends_about_the_picture_s_middle():
     away = measured.values[:, :2] - middle
     values = measured.values.copy()
     values[:, :2] += bent / 0.1**2 * (away**2).sum(axis=1)[:, None] * away
-    known = replace(measured, values=values, meta={"middle": middle.tolist()})
-    fit = udd.fit(known, udd.Disk(0.05), priors={"lens": (0.0, 0.02)})
+    baseline = replace(measured, values=values, meta={"middle": middle.tolist()})
+    fit = udd.fit(baseline, udd.Disk(0.05), priors={"lens": (0.0, 0.02)})
     for name, value in (("lens", bent), ("y0", 1e-3), ("z0", -7e-4)):
         assert abs(fit.parameters[name] - value) < 4 * fit.errors[name], name
     assert fit.errors["lens"] < bent / 4
@@ -119,10 +119,10 @@ def test_a_model_is_first_held_with_what_was_known_of_it(fits):
     """One in fifty noisy records makes friction flat (k1 near k0) while states follow the frames."""
     model, _camera, fit = fits[0]
     (values, camera, clock), *_ = _afresh(fit).sets
-    known = {f.name: f.mean for f in fit.problem.free if f.name in ("k0", "k1", "k2", "W")}
-    found = dict(zip(model.parameters, values, strict=True))
-    assert {name: found[name] for name in known} == known
-    assert found["relaxation.b"] == fit.parameters["relaxation.b"] != 0.0  # of which nothing was known
+    baseline = {f.name: f.mean for f in fit.problem.free if f.name in ("k0", "k1", "k2", "W")}
+    result = dict(zip(model.parameters, values, strict=True))
+    assert {name: result[name] for name in baseline} == baseline
+    assert result["relaxation.b"] == fit.parameters["relaxation.b"] != 0.0  # of which nothing was known
     assert (camera, clock) == fit.point.sets[0][1:]
 
 
@@ -218,27 +218,27 @@ def test_computed_motion_is_fitted(sd):
     rng = np.random.default_rng(0)
     swing = udd.simulate(udd.Pendulum(0.5, k0=0.01), np.arange(0, 12, 0.05), [0.0, 0.4])
     theta = swing.state[:, 1] + sd * rng.standard_normal(len(swing.t))
-    found = udd.fit(udd.Measurement(swing.t, {"theta": theta}), udd.Pendulum(0.5))
-    assert found.converged and found.parameters["k0"] == pytest.approx(0.01, abs=1e-6 + 0.1 * sd)
+    result = udd.fit(udd.Measurement(swing.t, {"theta": theta}), udd.Pendulum(0.5))
+    assert result.converged and result.parameters["k0"] == pytest.approx(0.01, abs=1e-6 + 0.1 * sd)
     run = udd.simulate(udd.Disk(0.042), np.arange(0, 20, 0.04), [2, 0.02, -0.02, 0])
     seen = run.state[:, 1:4] + sd * rng.standard_normal((len(run.t), 3))
-    found = udd.fit(udd.Measurement(run.t, seen), udd.Disk(0.042))
-    assert found.converged and found.parameters["k0"] == pytest.approx(0.012, abs=1e-8 + 0.1 * sd)
+    result = udd.fit(udd.Measurement(run.t, seen), udd.Disk(0.042))
+    assert result.converged and result.parameters["k0"] == pytest.approx(0.012, abs=1e-8 + 0.1 * sd)
 
 
 def test_lists_may_be_given_as_generators():
     t = np.arange(0, 20, 0.04)
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.7]).state[:, 1]
     measured = udd.Measurement(t, {"theta": theta + 1e-3 * np.random.default_rng(0).standard_normal(len(t))})
-    found = udd.fit(measured, udd.Pendulum(0.79), (n for n in ["k0"]), camera=(n for n in ["theta0"]))
-    assert list(found.parameters) == ["k0", "theta0"]
+    result = udd.fit(measured, udd.Pendulum(0.79), (n for n in ["k0"]), camera=(n for n in ["theta0"]))
+    assert list(result.parameters) == ["k0", "theta0"]
 
 
 def test_what_is_kept_of_a_fit_that_ran_away_keeps_what_each_record_has_and_what_is_known_of_it():
     two = [simulated.film(udd.Disk(0.04), np.random.default_rng(seed), 8.0)[0] for seed in (1, 2)]
-    known = {"y0": (0.0, 1e-5), "k0[0]": (0.012, 1e-3)}
+    baseline = {"y0": (0.0, 1e-5), "k0[0]": (0.012, 1e-3)}
     models = [udd.Disk(0.04), udd.Disk(0.04)]
-    base = fit_record(two, record_of(two, models), models, each=["W", "k0"], priors=known, search=True)
+    base = fit_record(two, record_of(two, models), models, each=["W", "k0"], priors=baseline, search=True)
     kept = {f.name: f for f in as_stated(base).problem.free}
     assert {"k0[0]", "k0[1]", "y0[0]", "y0[1]"} <= set(kept) and "W[0]" not in kept
     assert kept["k0[0]"].sd == 1e-3 and kept["y0[0]"].sd == 1e-5

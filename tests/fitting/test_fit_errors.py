@@ -28,16 +28,16 @@ def fitted(seed):
         row=rng.normal(0, 0.01),
     )
     measured, _ = film(truth, rng, 60.0, camera)
-    known = {n: truth.parameters[n] for n in NAMES} | {
+    baseline = {n: truth.parameters[n] for n in NAMES} | {
         "y0": camera.offset[0], "z0": camera.offset[1], "tilt": camera.tilt, "scale": camera.scale,
         "lag": camera.lag, "row": camera.row, "clock": camera.clock,
     }  # fmt: skip
-    return udd.fit(measured, udd.Disk(drive * (1 + 0.03 * rng.standard_normal()))), known
+    return udd.fit(measured, udd.Disk(drive * (1 + 0.03 * rng.standard_normal()))), baseline
 
 
 def z_scores(seed):
-    fit, known = fitted(seed)
-    return {name: (fit.parameters[name] - value) / fit.errors[name] for name, value in known.items()}
+    fit, baseline = fitted(seed)
+    return {name: (fit.parameters[name] - value) / fit.errors[name] for name, value in baseline.items()}
 
 
 def test_errors_of_fast_disks_cover():

@@ -38,8 +38,8 @@ def test_gain_and_delay_of_an_input_are_found(hold: Any) -> None:
     off = ARM.with_parameters({"k": 7.0, "c": 0.4, "g": 1.5, "tau": 0.0})
     pulls = []
     for seed in range(6):
-        found = udd.fit(record(seed, hold), off)
-        pulls.append([(found.parameters[n] - value) / found.errors[n] for n, value in TRUTH.items()])
+        result = udd.fit(record(seed, hold), off)
+        pulls.append([(result.parameters[n] - value) / result.errors[n] for n, value in TRUTH.items()])
     # 24 pulls: the largest of as many normal ones exceeds 4.2 in 1 of 1000.
     assert np.abs(pulls).max() < 4.2
     # Their mean square is chi2/24: within 0.4 to 2 but in 1 of 1000.
@@ -48,14 +48,14 @@ def test_gain_and_delay_of_an_input_are_found(hold: Any) -> None:
 
 def test_records_have_drives_and_clocks_of_their_own() -> None:
     off = ARM.with_parameters({"k": 7.0, "g": 1.5})
-    found = udd.fit([record(1, start=100.0), record(2, start=-5.0)], off)
+    result = udd.fit([record(1, start=100.0), record(2, start=-5.0)], off)
     for name, value in TRUTH.items():
-        assert abs(found.parameters[name] - value) < 4.2 * found.errors[name]
+        assert abs(result.parameters[name] - value) < 4.2 * result.errors[name]
     alone = udd.fit(record(1), off)
-    assert found.errors["g"] < alone.errors["g"]
+    assert result.errors["g"] < alone.errors["g"]
     # The second model's rates follow the second drive.
     drive = record(2).inputs["u"]
-    model = found.models[1]
+    model = result.models[1]
     assert isinstance(model, type(ARM))
     late = 3.0 - model.parameters["tau"]
     expected = model.parameters["g"] * drive(late)
@@ -75,19 +75,19 @@ def test_what_is_lacking_is_named() -> None:
 
 
 def test_a_forecast_follows_the_input_of_its_own_measurement() -> None:
-    found = udd.fit(record(1, start=100.0), ARM)
+    result = udd.fit(record(1, start=100.0), ARM)
     other = record(2, start=-5.0)
-    ahead = udd.forecast(other, found, 5.0, start=3.0, members=20)
+    ahead = udd.forecast(other, result, 5.0, start=3.0, members=20)
     truth = np.interp(ahead.t, other.t, other["q"])
     # Straight lines through an encoder's 1 mrad, and what the state is known to at the start.
     assert np.sqrt(np.mean((ahead.median[:, 0] - truth) ** 2)) < 3e-3
 
 
 def test_a_saved_fit_keeps_its_inputs(tmp_path: Path) -> None:
-    found = udd.fit([record(1), record(2)], ARM)
-    udd.save(found, tmp_path / "fit.npz")
+    result = udd.fit([record(1), record(2)], ARM)
+    udd.save(result, tmp_path / "fit.npz")
     again = udd.load(tmp_path / "fit.npz")
     assert isinstance(again, udd.Fit)
     at = (3.0, [0.1, 0.2])
-    for one, other in zip(again.models, found.models, strict=True):
-        assert one.rates(*at).tolist() == other.rates(*at).tolist()
+    for item, other in zip(again.models, result.models, strict=True):
+        assert item.rates(*at).tolist() == other.rates(*at).tolist()

@@ -27,10 +27,12 @@ def test_errors_are_as_large_as_they_say(n: int) -> None:
     """Pulls of the free numbers over twenty drawn records."""
     pulls = []
     for seed in range(20):
-        found = udd.fit(drawn(n, seed), ring(n).replace(F=7.6, a=1.03))
-        assert found.converged and found.states.shape == (200, n)
-        assert found.state_covariance.shape == (200, n, n)
-        pulls.append([(found.parameters[k] - true) / found.errors[k] for k, true in (("F", 8.0), ("a", 1.0))])
+        result = udd.fit(drawn(n, seed), ring(n).replace(F=7.6, a=1.03))
+        assert result.converged and result.states.shape == (200, n)
+        assert result.state_covariance.shape == (200, n, n)
+        pulls.append(
+            [(result.parameters[k] - true) / result.errors[k] for k, true in (("F", 8.0), ("a", 1.0))]
+        )
     # Of 40 normal numbers the mean square is 1 +- 0.22, and none is above 4.5 but in one of 3000 draws.
     assert 0.5 < np.square(pulls).mean() < 2.0
     assert np.abs(pulls).max() < 4.5
@@ -47,12 +49,14 @@ def test_filled_up_numbers_of_states_are_fitted_and_foretold(n: int) -> None:
     t = np.arange(0.0, 3.0, 0.02)
     seen = [noisy(model, t, start, 0.02, 7 + k) for k, start in enumerate(starts)]
     guess = model.with_parameters({name: 1.1 * value for name, value in true.items()})
-    found = udd.fit(seen, guess)
-    assert found.converged and len(found.parameters) == n + 1
-    pulls = np.array([(found.parameters[name] - value) / found.errors[name] for name, value in true.items()])
+    result = udd.fit(seen, guess)
+    assert result.converged and len(result.parameters) == n + 1
+    pulls = np.array(
+        [(result.parameters[name] - value) / result.errors[name] for name, value in true.items()]
+    )
     # Of n + 1 normal numbers; none is above 4.5 but in one of 10^4 draws.
     assert np.abs(pulls).max() < 4.5 and np.square(pulls).mean() < 3.0
-    assert found.residuals.shape == (3 * len(t), n)
-    ahead = udd.forecast(seen[0], found, np.arange(0.0, 0.81, 0.02), start=2.0, window=0.5, members=20)
+    assert result.residuals.shape == (3 * len(t), n)
+    ahead = udd.forecast(seen[0], result, np.arange(0.0, 0.81, 0.02), start=2.0, window=0.5, members=20)
     # What is foretold is measured with a noise of 0.02; none of 400 normal numbers is above 5.
     assert np.abs(ahead.median - seen[0].values[100:141]).max() < 0.1

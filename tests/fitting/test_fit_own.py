@@ -25,29 +25,29 @@ def test_lorenz_is_fitted_from_noisy_states() -> None:
     noise = [0.8, 0.9, 0.85]  # ten percent
     seen = Measurement(t, measured(lorenz(), t, [-5.0, -6.0, 22.0], noise, 1), names=("x", "y", "z"))
     assert seen.kind == "own"
-    found = udd.fit(seen, lorenz(sigma=9.0, rho=26.0, beta=3.0))
-    assert found.converged and set(found.parameters) == {"sigma", "rho", "beta"}
+    result = udd.fit(seen, lorenz(sigma=9.0, rho=26.0, beta=3.0))
+    assert result.converged and set(result.parameters) == {"sigma", "rho", "beta"}
     for name, true in lorenz().parameters.items():
         # Of three parameters none is off by four standard errors but in one of 5000 records.
-        assert abs(found.parameters[name] - true) < 4.0 * found.errors[name]
-        assert found.errors[name] < 0.02 * true
+        assert abs(result.parameters[name] - true) < 4.0 * result.errors[name]
+        assert result.errors[name] < 0.02 * true
     # The noise is found as it is, to a few percent of 600 frames.
-    sd = found.noise.sd(found.record, np.zeros(len(found.record.t)))
+    sd = result.noise.sd(result.record, np.zeros(len(result.record.t)))
     np.testing.assert_allclose(np.median(sd, axis=0), noise, rtol=0.15)
-    assert set(found.to_dict()["noise"]) == {"x", "y", "z"}
-    assert found.residuals.shape == (len(t), 3) and 0.7 < found.scatter < 1.3
+    assert set(result.to_dict()["noise"]) == {"x", "y", "z"}
+    assert result.residuals.shape == (len(t), 3) and 0.7 < result.scatter < 1.3
 
 
 def test_a_state_that_is_not_seen_is_found() -> None:
     t = np.arange(0.0, 8.0, 0.02)
     values = measured(lorenz(), t, [-5.0, -6.0, 22.0], [0.1, 0.1, 0.1], 2)
-    found = udd.fit(Measurement(t, values[:, :2], names=("x", "y")), lorenz(rho=27.0), free=["rho"])
-    assert abs(found.parameters["rho"] - 28.0) < 4.0 * found.errors["rho"]
+    result = udd.fit(Measurement(t, values[:, :2], names=("x", "y")), lorenz(rho=27.0), free=["rho"])
+    assert abs(result.parameters["rho"] - 28.0) < 4.0 * result.errors["rho"]
     truth = udd.simulate(lorenz(), t, [-5.0, -6.0, 22.0], method="taylor").state
-    error = (found.states - truth)[:, 2] / np.sqrt(found.state_covariance[:, 2, 2])
+    error = (result.states - truth)[:, 2] / np.sqrt(result.state_covariance[:, 2, 2])
     # Errors in units of their own: neighbours share theirs, so that the mean of their squares varies.
     assert 0.3 < np.sqrt((error**2).mean()) < 2.0
-    assert np.isnan(found.misfit[:, 2]).all() and found.to_dict()["noise"].keys() == {"x", "y", "z"}
+    assert np.isnan(result.misfit[:, 2]).all() and result.to_dict()["noise"].keys() == {"x", "y", "z"}
 
 
 def test_an_angle_counts_modulo_a_turn() -> None:
@@ -61,11 +61,11 @@ def test_an_angle_counts_modulo_a_turn() -> None:
     theta = measured(driven, t, [0.2, 0.0], [0.01, 0.0], 3)[:, 0]
     assert np.ptp(theta) > 2 * np.pi
     wrapped = Measurement(t, np.mod(theta + np.pi, 2 * np.pi) - np.pi, names=("theta",))
-    found = udd.fit(wrapped, driven.replace(c=0.25, f=1.35), free=["c", "f"])
+    result = udd.fit(wrapped, driven.replace(c=0.25, f=1.35), free=["c", "f"])
     for name in ("c", "f"):
-        assert abs(found.parameters[name] - driven.parameters[name]) < 4.0 * found.errors[name]
+        assert abs(result.parameters[name] - driven.parameters[name]) < 4.0 * result.errors[name]
     # Seen in either way it is the same to the fit.
-    assert found.scatter == pytest.approx(1.0, abs=0.2)
+    assert result.scatter == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_term_that_is_missing_is_fitted() -> None:
@@ -76,11 +76,11 @@ def test_a_term_that_is_missing_is_fitted() -> None:
         4
     ).standard_normal(len(t))
     seen = Measurement(t, theta, names=("theta",))
-    found = udd.fit(seen, swing.with_term("v", "v*abs(v)", drag=0.0))  # type: ignore[attr-defined]
-    assert abs(found.parameters["drag"] + 0.05) < 4.0 * found.errors["drag"] < 0.01
-    assert found.scatter < 1.2
+    result = udd.fit(seen, swing.with_term("v", "v*abs(v)", drag=0.0))  # type: ignore[attr-defined]
+    assert abs(result.parameters["drag"] + 0.05) < 4.0 * result.errors["drag"] < 0.01
+    assert result.scatter < 1.2
     # The model without it is held loosely, where its misfits are no larger; its evidence tells the two apart.
-    assert found.evidence > udd.fit(seen, swing).evidence + 10.0
+    assert result.evidence > udd.fit(seen, swing).evidence + 10.0
 
 
 def test_measurements_of_own_models_are_read_back(tmp_path: Path) -> None:
@@ -97,8 +97,8 @@ def test_measurements_of_own_models_are_read_back(tmp_path: Path) -> None:
 
 def test_what_does_not_belong_together_is_refused() -> None:
     t = np.arange(0.0, 2.0, 0.1)
-    own = Measurement(t, {"u": np.sin(t)})
+    each = Measurement(t, {"u": np.sin(t)})
     with pytest.raises(FitError, match="columns u, but the model's states are x, y, z"):
-        udd.fit(own, lorenz())
+        udd.fit(each, lorenz())
     with pytest.raises(FitError, match="columns u, which are neither a disk's"):
-        udd.fit(own, udd.Pendulum(0.5))
+        udd.fit(each, udd.Pendulum(0.5))

@@ -48,8 +48,8 @@ def test_a_late_sensor_sees_the_state_of_before() -> None:
 def test_gain_zero_bias_and_delay_are_found() -> None:
     pulls = []
     for seed in range(8):
-        found = udd.fit(seen(seed), OFF)
-        pulls.append([(found.parameters[n] - value) / found.errors[n] for n, value in TRUTH.items()])
+        result = udd.fit(seen(seed), OFF)
+        pulls.append([(result.parameters[n] - value) / result.errors[n] for n, value in TRUTH.items()])
     # 48 pulls: the largest of as many normal ones exceeds 4.3 in 1 of 1000, and their mean square is
     # chi2/48: within 0.5 to 1.8 but in 1 of 1000.
     assert np.abs(pulls).max() < 4.3
@@ -62,11 +62,11 @@ def test_sensors_have_rates_and_clocks_of_their_own() -> None:
     whole = seen(3, t=t)
     volts = np.where(np.isin(t, T), whole["volts"], np.nan)
     gyro = np.where(np.isin(t, gyro_times), whole["gyro"], np.nan)
-    found = udd.fit(udd.Measurement(t, {"volts": volts, "gyro": gyro}), OFF)
+    result = udd.fit(udd.Measurement(t, {"volts": volts, "gyro": gyro}), OFF)
     for name, value in TRUTH.items():
-        assert abs(found.parameters[name] - value) < 4.0 * found.errors[name], name
+        assert abs(result.parameters[name] - value) < 4.0 * result.errors[name], name
     # Nothing is made up where a sensor was silent.
-    assert np.isfinite(found.misfit).sum() == len(T) + len(gyro_times)
+    assert np.isfinite(result.misfit).sum() == len(T) + len(gyro_times)
 
 
 def test_the_step_of_an_encoder_is_its_noise() -> None:
@@ -74,10 +74,10 @@ def test_the_step_of_an_encoder_is_its_noise() -> None:
     smooth = seen(1, counts, noise=0.0)
     step = 2 * np.pi / 500
     coarse = udd.Measurement(T, {"counts": step * np.round(smooth["counts"] / step)})
-    found = udd.fit(coarse, counts.with_parameters({"k": 18.0, "zero": 0.0}), free=["k", "c", "zero"])
-    assert abs(found.parameters["k"] / TRUTH["k"] - 1.0) < 1e-3
-    assert abs(found.parameters["zero"] - TRUTH["zero"]) < 4.0 * found.errors["zero"] < 1e-2
-    (reading,) = found.doubts.sensor
+    result = udd.fit(coarse, counts.with_parameters({"k": 18.0, "zero": 0.0}), free=["k", "c", "zero"])
+    assert abs(result.parameters["k"] / TRUTH["k"] - 1.0) < 1e-3
+    assert abs(result.parameters["zero"] - TRUTH["zero"]) < 4.0 * result.errors["zero"] < 1e-2
+    (reading,) = result.doubts.sensor
     assert abs(reading.step / step - 1.0) < 1e-6
     assert abs(reading.noise / (step / np.sqrt(12.0)) - 1.0) < 0.3
 
@@ -105,9 +105,9 @@ def test_where_a_tip_is_tells_both_angles() -> None:
     rng = np.random.default_rng(5)
     values = arm.observed(t, run.state) + 1e-3 * rng.normal(size=(len(t), 4))
     measured = udd.Measurement(t, dict(zip(tips, values.T, strict=True)))
-    found = udd.fit(measured, arm.with_parameters({"b1": 0.01, "b2": 0.03}), free=["b1", "b2", "l1", "l2"])
+    result = udd.fit(measured, arm.with_parameters({"b1": 0.01, "b2": 0.03}), free=["b1", "b2", "l1", "l2"])
     for name in ("b1", "b2", "l1", "l2"):
-        assert abs(found.parameters[name] - arm.parameters[name]) < 4.0 * found.errors[name], name
+        assert abs(result.parameters[name] - arm.parameters[name]) < 4.0 * result.errors[name], name
 
 
 def test_an_accelerometer_feels_what_is_missing() -> None:
@@ -137,24 +137,24 @@ def test_a_phone_on_a_pendulum_has_more_sensors_than_states() -> None:
     for seed in range(6):
         measured = seen(seed, phone, noise=[0.02, 0.05, 0.05, 0.01])
         alone = udd.Measurement(measured.t, {name: measured[name] for name in ("gyro", "along", "across")})
-        found = udd.fit(alone, phone.with_parameters({"l": 0.55, "c": 0.1, "r": 0.25, "bias": 0.0}), names)
-        pulls.append([(found.parameters[n] - phone.parameters[n]) / found.errors[n] for n in names])
+        result = udd.fit(alone, phone.with_parameters({"l": 0.55, "c": 0.1, "r": 0.25, "bias": 0.0}), names)
+        pulls.append([(result.parameters[n] - phone.parameters[n]) / result.errors[n] for n in names])
     # 30 pulls: the largest of as many normal ones exceeds 4.2 in 1 of 1000, their mean square 2 as rarely.
     assert np.abs(pulls).max() < 4.2
     assert 0.3 < np.square(pulls).mean() < 2.0
 
 
 def test_what_is_missing_is_found_through_a_gyroscope_alone() -> None:
-    known = udd.Model(
+    baseline = udd.Model(
         ["theta", "w"], ["w", "-k*sin(theta) - c*w"], {"k": 21.3, "c": 0.05, "bias": 0.1},
         angles=["theta"], observe={"gyro": "w + bias"},
     )  # fmt: skip
-    truth = known.with_effects([udd.effects.formula("w'", "q*abs(w)*w", q=-0.08)])
-    found = udd.discover(seen(2, truth, noise=0.01), known)
-    assert found.verdict == "effect identified"
-    (effect,) = found.effects
+    truth = baseline.with_effects([udd.effects.formula("w'", "q*abs(w)*w", q=-0.08)])
+    result = udd.discover(seen(2, truth, noise=0.01), baseline)
+    assert result.verdict == "effect identified"
+    (effect,) = result.effects
     assert "abs(w)*w" in effect.expression or "w*abs(w)" in effect.expression
-    assert found.error_after.whole < 0.3 * found.error_before.whole
+    assert result.error_after.whole < 0.3 * result.error_before.whole
 
 
 def test_forecasts_are_of_the_sensors() -> None:
@@ -197,7 +197,7 @@ def test_a_column_that_no_sensor_has_is_told() -> None:
 
 def test_a_late_sensor_of_a_driven_machine_sees_through_the_steps_of_its_input() -> None:
     rng = np.random.default_rng(0)
-    held = udd.InputSignal(np.arange(0, 10.05, 0.05), rng.normal(size=201), hold="zero")
+    fixed = udd.InputSignal(np.arange(0, 10.05, 0.05), rng.normal(size=201), hold="zero")
     cart = udd.Model(
         ["x", "v"],
         ["v", "-4*x - 0.5*v + 20*u"],
@@ -209,11 +209,11 @@ def test_a_late_sensor_of_a_driven_machine_sees_through_the_steps_of_its_input()
     t = np.arange(1.0, 9.0, 0.0137)
     now, before = (
         udd.simulate(
-            cart, [0.0, *at], [0.2, 0.0], inputs={"u": held}, method="dop853", rtol=1e-11, atol=1e-12
+            cart, [0.0, *at], [0.2, 0.0], inputs={"u": fixed}, method="dop853", rtol=1e-11, atol=1e-12
         )
         for at in (t, t - 0.12)
     )
-    seen = cart.with_inputs({"u": held}).observed(t, now.state[1:])[:, 0]
+    seen = cart.with_inputs({"u": fixed}).observed(t, now.state[1:])[:, 0]
     # The way back is followed to 1e-8.
     assert np.abs(seen - before.v[1:]).max() < 1e-6
 
@@ -225,8 +225,8 @@ def test_columns_with_gaps_are_not_averaged_in_blocks() -> None:
     a = np.cos(2 * t) + 1e-3 * rng.normal(size=len(t))
     b = -2 * np.sin(2 * t) + 1e-3 * rng.normal(size=len(t))
     b[::7] = np.nan
-    found = udd.discover(udd.Measurement(t, {"a": a, "b": b}), swing)
-    assert found.verdict == "nothing missing" and not found.thinned
+    result = udd.discover(udd.Measurement(t, {"a": a, "b": b}), swing)
+    assert result.verdict == "nothing missing" and not result.thinned
 
 
 @pytest.mark.parametrize("few", [0, 1, 9])

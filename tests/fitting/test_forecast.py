@@ -46,10 +46,10 @@ def test_the_fan_of_a_pendulum_covers_as_often_as_it_says() -> None:
         theta = udd.simulate(truth, t, [0.0, rng.uniform(0.3, 1.2)]).state[:, 1]
         seen = udd.Measurement(t, {"theta": theta + 2e-3 * rng.standard_normal(len(t))})
         fitted = udd.fit(seen.slice(0, 20), udd.Pendulum(1.02 * truth.length, k0=0.02))
-        found = udd.forecast(seen, fitted, ahead, start=20.0, members=100, level=0.8)
-        true = theta[np.round(found.t / 0.05).astype(int), None]
-        inside.append((true >= found.low) & (true <= found.high))
-        z.append((true - found.members.mean(axis=0)) / found.members.std(axis=0))
+        result = udd.forecast(seen, fitted, ahead, start=20.0, members=100, level=0.8)
+        true = theta[np.round(result.t / 0.05).astype(int), None]
+        inside.append((true >= result.low) & (true <= result.high))
+        z.append((true - result.members.mean(axis=0)) / result.members.std(axis=0))
     # 30 records and four times that go together within a record: between 30 and 120 draws with p = 0.8, whose
     # share scatters by 0.037 to 0.073.
     assert 0.62 < np.mean(inside) < 0.95
@@ -71,10 +71,10 @@ def test_the_fan_of_a_disk_covers_the_truth() -> None:
         seen = udd.Measurement(t[: len(true)], true + [5e-4, 5e-4, 7e-3] * rng.standard_normal(true.shape))
         fitted = udd.fit(seen.slice(0, 20), udd.Disk(1.02 * truth.W))
         for start in (20.0, 21.0, 22.0, 23.0):
-            found = udd.forecast(seen, fitted, ahead, start=start, members=60, level=0.9)
-            there = true[np.round(found.t / 0.04).astype(int)]
-            inside.append((there >= found.low) & (there <= found.high))
-            z.append((there - np.nanmean(found.members, axis=0)) / np.nanstd(found.members, axis=0))
+            result = udd.forecast(seen, fitted, ahead, start=start, members=60, level=0.9)
+            there = true[np.round(result.t / 0.04).astype(int)]
+            inside.append((there >= result.low) & (there <= result.high))
+            z.append((there - np.nanmean(result.members, axis=0)) / np.nanstd(result.members, axis=0))
     # 24 forecasts, few of them independent at later times.
     assert np.mean(inside) > 0.75
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.15
@@ -83,37 +83,37 @@ def test_the_fan_of_a_disk_covers_the_truth() -> None:
 def test_the_fan_opens_and_the_model_is_let_go_where_asked(
     rolled: tuple[udd.Measurement, udd.Forecast],
 ) -> None:
-    measured, found = rolled
+    measured, result = rolled
     last = measured.t[measured.seen & (measured.t <= 20.0)][-1]
-    assert found.start == pytest.approx(last)
-    assert found.t[-1] == pytest.approx(last + 9.0)
-    assert found.members.shape == (60, 901, 3)
-    width = (found.high - found.low)[:, 1]
+    assert result.start == pytest.approx(last)
+    assert result.t[-1] == pytest.approx(last + 9.0)
+    assert result.members.shape == (60, 901, 3)
+    width = (result.high - result.low)[:, 1]
     assert width[0] < 1.5e-3  # six times the noise of a frame would say nothing was filtered
     assert np.nanmax(width[-200:]) > 0.03  # chaos has filled the attractor
     # No frame after the start is used.
-    cut = udd.forecast(measured.slice(0, 20), found.fit, 9.0, members=60)
-    np.testing.assert_array_equal(cut.members, found.members)
+    cut = udd.forecast(measured.slice(0, 20), result.fit, 9.0, members=60)
+    np.testing.assert_array_equal(cut.members, result.members)
 
 
 def test_the_valid_time_is_that_of_half_the_members(rolled: tuple[udd.Measurement, udd.Forecast]) -> None:
-    _, found = rolled
-    size = np.hypot(*(found.members - found.median)[:, :, :2].transpose(2, 0, 1))
+    _, result = rolled
+    size = np.hypot(*(result.members - result.median)[:, :, :2].transpose(2, 0, 1))
     parted = np.array([np.argmax(~(row <= 5e-3)) if (~(row <= 5e-3)).any() else 10**9 for row in size])
-    k = round(found.valid_time / 0.01)
+    k = round(result.valid_time / 0.01)
     # Within a grid step of the median of the members' own times.
     assert np.mean(parted <= k - 1) <= 0.5 <= np.mean(parted <= k + 1)
-    assert found.valid_low <= found.valid_time <= found.valid_high
-    assert 0.0 < found.measured_valid_time <= 9.0
-    looser = udd.forecast(found.measurement, found.fit, 9.0, start=20.0, members=60, error=0.02)
-    assert looser.valid_time > found.valid_time
+    assert result.valid_low <= result.valid_time <= result.valid_high
+    assert 0.0 < result.measured_valid_time <= 9.0
+    looser = udd.forecast(result.measurement, result.fit, 9.0, start=20.0, members=60, error=0.02)
+    assert looser.valid_time > result.valid_time
 
 
 def test_the_lyapunov_time_is_that_of_the_model(rolled: tuple[udd.Measurement, udd.Forecast]) -> None:
-    _, found = rolled
-    rate = udd.lyapunov(found.fit.model.replace(edge="ignore"))
-    assert found.lyapunov_time == pytest.approx(1.0 / rate, rel=0.05)  # 1-2 % error of a short average
-    assert found.lyapunov_times == pytest.approx(found.valid_time / found.lyapunov_time)
+    _, result = rolled
+    rate = udd.lyapunov(result.fit.model.replace(edge="ignore"))
+    assert result.lyapunov_time == pytest.approx(1.0 / rate, rel=0.05)  # 1-2 % error of a short average
+    assert result.lyapunov_times == pytest.approx(result.valid_time / result.lyapunov_time)
 
 
 def test_a_model_is_fitted_first(swing: tuple[udd.Measurement, np.ndarray], swung: udd.Fit) -> None:
@@ -127,9 +127,9 @@ def test_a_model_is_fitted_first(swing: tuple[udd.Measurement, np.ndarray], swun
 
 
 def test_the_seed_decides(swing: tuple[udd.Measurement, np.ndarray], swung: udd.Fit) -> None:
-    one, two, other = (udd.forecast(swing[0], swung, 2.0, members=20, rng=s) for s in (3, 3, 4))
-    np.testing.assert_array_equal(one.members, two.members)
-    assert (one.members != other.members).any()
+    item, two, other = (udd.forecast(swing[0], swung, 2.0, members=20, rng=s) for s in (3, 3, 4))
+    np.testing.assert_array_equal(item.members, two.members)
+    assert (item.members != other.members).any()
 
 
 def test_a_fit_that_does_not_explain_its_data_widens_the_fan(
@@ -137,7 +137,7 @@ def test_a_fit_that_does_not_explain_its_data_widens_the_fan(
 ) -> None:
     plain = udd.forecast(swing[0], replace(swung, chi2=swung.dof), 5.0, members=40)
     worse = udd.forecast(swing[0], replace(swung, chi2=9 * swung.dof), 5.0, members=40)
-    spread = [found.members[:, :, 0].std(axis=0) for found in (plain, worse)]
+    spread = [result.members[:, :, 0].std(axis=0) for result in (plain, worse)]
     # Three times the draws, of which the filter of a narrow window corrects a part.
     assert np.median(spread[1] / spread[0]) == pytest.approx(3.0, rel=0.15)
 
@@ -146,8 +146,8 @@ def test_a_gap_before_the_start_is_not_filtered_across(swing: tuple[udd.Measurem
     measured, _ = swing
     holes = measured.rows((measured.t < 18.0) | (measured.t > 19.6))
     fitted = udd.fit(holes.slice(0, 18), udd.Pendulum(1.0, k0=0.03))
-    found = udd.forecast(holes, fitted, 2.0, start=20.5, members=20)
-    assert np.abs(found.median[0, 0] - measured["theta"][np.searchsorted(measured.t, found.start)]) < 8e-3
+    result = udd.forecast(holes, fitted, 2.0, start=20.5, members=20)
+    assert np.abs(result.median[0, 0] - measured["theta"][np.searchsorted(measured.t, result.start)]) < 8e-3
     with pytest.raises(FitError, match="4 consecutive frames"):
         udd.forecast(holes, fitted, 2.0, start=19.8, members=20)
 
@@ -163,14 +163,14 @@ def test_a_joint_fit_forecasts_each_of_its_films() -> None:
     ]
     joint = udd.fit(films, udd.Pendulum(1.0, k0=0.03))
     for k, film in enumerate(films):
-        found = udd.forecast(film, joint, [0.0, 2.0], start=20.0, members=20)
+        result = udd.forecast(film, joint, [0.0, 2.0], start=20.0, members=20)
         # Where the first camera's lean taken for the second's would be wrong by 0.08.
-        np.testing.assert_allclose(found.median[:, 0], (true[k] + lean[k])[[400, 440]], atol=3e-3)
+        np.testing.assert_allclose(result.median[:, 0], (true[k] + lean[k])[[400, 440]], atol=3e-3)
     cut = films[1].slice(0, 20.01)
     with pytest.raises(FitError, match="pass the number of this one"):
         udd.forecast(cut, joint, 1.0)
     again = udd.forecast(cut, joint, [0.0, 2.0], members=20, film=1)
-    np.testing.assert_array_equal(again.members, found.members)
+    np.testing.assert_array_equal(again.members, result.members)
     with pytest.raises(UddError, match="film must be a whole number from 0 to 1"):
         udd.forecast(cut, joint, 1.0, film=2)
 
@@ -200,15 +200,15 @@ def test_bad_input_is_named(
 
 
 def test_the_picture_shows_the_fan(rolled: tuple[udd.Measurement, udd.Forecast]) -> None:
-    _, found = rolled
-    ax = udd.plot.forecast(found, coordinate="Y")
+    _, result = rolled
+    ax = udd.plot.forecast(result, coordinate="Y")
     assert "Y" in ax.get_ylabel()
     median = next(line for line in ax.lines if line.get_label() == "median")
-    np.testing.assert_allclose(median.get_ydata(), 100 * found.median[:, 0])
+    np.testing.assert_allclose(median.get_ydata(), 100 * result.median[:, 0])
     with pytest.raises(UddError, match="not theta"):
-        udd.plot.forecast(found, coordinate="theta")
+        udd.plot.forecast(result, coordinate="theta")
     with pytest.raises(UddError, match="a forecast has a fan"):
-        udd.plot.forecast(found.fit)
+        udd.plot.forecast(result.fit)
     plt.close("all")
 
 
@@ -243,23 +243,23 @@ def test_a_users_own_model_is_run_on_too(x):
     truth = udd.Model([x, "v"], {x: "v", "v": f"-k*{x} - c*v"}, {"k": 9.0, "c": 0.05})
     motion = udd.simulate(truth, t, [1.0, 0.0]).state
     seen = udd.Measurement(t, motion[:, :1] + 0.01 * rng.standard_normal((len(t), 1)), names=(x,))
-    found = udd.forecast(seen, truth.with_parameters({"k": 8.8}), start=12.0, t=t[601:] - t[600])
-    assert found.names == (x,) and found.lyapunov_time == np.inf and found.valid_time == np.inf
-    inside = (found.low[:, 0] <= motion[600:, 0]) & (motion[600:, 0] <= found.high[:, 0])
+    result = udd.forecast(seen, truth.with_parameters({"k": 8.8}), start=12.0, t=t[601:] - t[600])
+    assert result.names == (x,) and result.lyapunov_time == np.inf and result.valid_time == np.inf
+    inside = (result.low[:, 0] <= motion[600:, 0]) & (motion[600:, 0] <= result.high[:, 0])
     # The band is one of 95 %; its errors go together for as long as the forecast lasts.
     assert inside.mean() > 0.7
-    assert np.abs(found.median[:, 0] - motion[600:, 0]).max() < 0.02
-    assert found.to_dict()[x]["median"].shape == (200,)
+    assert np.abs(result.median[:, 0] - motion[600:, 0]).max() < 0.02
+    assert result.to_dict()[x]["median"].shape == (200,)
 
 
 def test_a_generator_and_the_name_of_before_give_the_same_fan(
     swing: tuple[udd.Measurement, np.ndarray], swung: udd.Fit
 ) -> None:
-    one = udd.forecast(swing[0], swung, 2.0, members=20, rng=3)
+    item = udd.forecast(swing[0], swung, 2.0, members=20, rng=3)
     other = udd.forecast(swing[0], swung, 2.0, members=20, rng=np.random.default_rng(3))
     with pytest.warns(DeprecationWarning, match=r"seed=\.\.\.\) is called rng="):
         before = udd.forecast(swing[0], swung, 2.0, members=20, seed=3)
-    np.testing.assert_array_equal(one.members, other.members)
-    np.testing.assert_array_equal(one.members, before.members)
+    np.testing.assert_array_equal(item.members, other.members)
+    np.testing.assert_array_equal(item.members, before.members)
     with pytest.raises(udd.errors.ModelError, match="rng must be a whole number, 0 or more"):
         udd.forecast(swing[0], swung, 2.0, members=20, rng=-1)

@@ -30,9 +30,9 @@ def tanks(seed: int) -> udd.Measurement:
 def test_the_hidden_start_of_a_tank_is_found() -> None:
     pulls = []
     for seed in range(6):
-        found = udd.fit(tanks(seed), OFF, ["k1", "k2", "k3"])
-        own = [(found.parameters[n] - TANKS.parameters[n]) / found.errors[n] for n in ("k1", "k2", "k3")]
-        pulls.append([*own, (found.states[0, 0] - 4.0) / np.sqrt(found.state_covariance[0, 0, 0])])
+        result = udd.fit(tanks(seed), OFF, ["k1", "k2", "k3"])
+        each = [(result.parameters[n] - TANKS.parameters[n]) / result.errors[n] for n in ("k1", "k2", "k3")]
+        pulls.append([*each, (result.states[0, 0] - 4.0) / np.sqrt(result.state_covariance[0, 0, 0])])
     # 24 pulls: the largest of as many normal ones exceeds 4.2 in 1 of 1000, their mean square 2 as rarely.
     assert np.abs(pulls).max() < 4.2
     assert 0.3 < np.square(pulls).mean() < 2.0
@@ -46,8 +46,8 @@ def test_what_the_data_cannot_say_is_told() -> None:
 
 def test_a_state_that_is_asked_for_is_named() -> None:
     t = np.arange(0.0, 10.0, 0.05)
-    apart = udd.Model(["x", "y"], ["-k*x", "-ln(y)"], {"k": 0.3})
+    separate = udd.Model(["x", "y"], ["-k*x", "-ln(y)"], {"k": 0.3})
     with pytest.raises(
         FitError, match=r"y is not observed: say where the motion starts, state0=\{'y': ...\}"
     ):
-        udd.fit(udd.Measurement(t, {"x": np.exp(-0.3 * t) + 1e-3 * np.sin(77 * t)}), apart)
+        udd.fit(udd.Measurement(t, {"x": np.exp(-0.3 * t) + 1e-3 * np.sin(77 * t)}), separate)

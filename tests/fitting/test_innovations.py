@@ -31,10 +31,10 @@ def fits() -> list[udd.Fit]:
 def test_a_right_model_leaves_white_noise(fits: list[udd.Fit]) -> None:
     squares, scaled = [], []
     for fit in fits:
-        found = innovations(fit)
-        assert np.isfinite(found.values).mean() > 0.9
-        rho, sd = found.autocorrelation(25)
-        squares.append(found.chi2)
+        result = innovations(fit)
+        assert np.isfinite(result.values).mean() > 0.9
+        rho, sd = result.autocorrelation(25)
+        squares.append(result.chi2)
         scaled.append(rho / sd)
     # The estimate of the noise, and the assumed model error (there is none), move it by a few percent.
     np.testing.assert_allclose(np.mean(squares, axis=0), 1.0, atol=0.15)
@@ -43,8 +43,8 @@ def test_a_right_model_leaves_white_noise(fits: list[udd.Fit]) -> None:
 
 
 def test_a_missing_effect_leaves_colour() -> None:
-    found = discovered.disk()
-    before, after = innovations(found.baseline), innovations(found.fit)
+    result = discovered.disk()
+    before, after = innovations(result.baseline), innovations(result.fit)
     assert (before.ljung_box(25)[1] < 1e-9).all()
     assert (before.chi2 > 2.0).all()
     assert (after.chi2 < 1.4).all()
@@ -86,29 +86,29 @@ def test_innovations_are_those_of_dense_algebra(memory: float) -> None:
     white = scipy.linalg.solve_triangular(
         np.linalg.cholesky(covariance[np.ix_(there, there)]), rest, lower=True
     )
-    found = innovations(fit).values
-    assert np.isnan(found[:12, 0]).all() and np.isnan(found[30, 0])
+    result = innovations(fit).values
+    assert np.isnan(result[:12, 0]).all() and np.isnan(result[30, 0])
     # The flow is followed to 1e-8 of the states, a millionth of the noise.
-    np.testing.assert_allclose(found[there[12:], 0], white[12:], atol=1e-5)
+    np.testing.assert_allclose(result[there[12:], 0], white[12:], atol=1e-5)
 
 
 def test_a_gap_starts_the_filter_anew() -> None:
     measured, _ = simulated.film(udd.Disk(0.04), np.random.default_rng(3), 30.0)
     values = measured.values.copy()
     values[300:340] = np.nan
-    found = innovations(udd.fit(udd.Measurement(measured.t, values), udd.Disk(0.041)))
-    assert np.nanmax(np.abs(found.values)) < 12  # outliers of eight deviations, and nothing from the gap
+    result = innovations(udd.fit(udd.Measurement(measured.t, values), udd.Disk(0.041)))
+    assert np.nanmax(np.abs(result.values)) < 12  # outliers of eight deviations, and nothing from the gap
 
 
 def test_ljung_box_is_the_textbooks() -> None:
     rng = np.random.default_rng(5)
     x = rng.standard_normal((500, 1))
-    found = Innovations(("theta",), 0.05, x)
+    result = Innovations(("theta",), 0.05, x)
     y = x[:, 0] - x[:, 0].mean()
     rho = np.array([y[k:] @ y[:-k] / (y @ y) for k in range(1, 11)])
     textbook = 500 * 502 * float(np.sum(rho**2 / (500 - np.arange(1, 11))))
     # The same but for terms of order k/n.
-    assert found.ljung_box(10)[0][0] == pytest.approx(textbook, rel=0.03)
+    assert result.ljung_box(10)[0][0] == pytest.approx(textbook, rel=0.03)
     white = [
         Innovations(("theta",), 0.05, rng.standard_normal((400, 1))).ljung_box(10)[1][0] for _ in range(200)
     ]
@@ -131,12 +131,12 @@ def test_the_means_of_residuals_have_honest_errors(fits: list[udd.Fit]) -> None:
 def test_what_any_of_several_records_sees_is_looked_at() -> None:
     """Two records of an own model, one of which sees x and the other v, with a force that it lacks."""
     t = np.arange(0, 20, 0.05)
-    known = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v"}, {"k": 9.0, "c": 0.1})
+    baseline = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v"}, {"k": 9.0, "c": 0.1})
     pushed = udd.Model(["x", "v"], {"x": "v", "v": "-k*x - c*v + 0.3*sin(5*t)"}, {"k": 9.0, "c": 0.1})
     rng = np.random.default_rng(0)
-    x = udd.simulate(known, t, [1.0, 0.0]).state[:, 0] + 5e-3 * rng.standard_normal(len(t))
+    x = udd.simulate(baseline, t, [1.0, 0.0]).state[:, 0] + 5e-3 * rng.standard_normal(len(t))
     v = udd.simulate(pushed, t, [1.0, 0.0]).state[:, 1] + 5e-3 * rng.standard_normal(len(t))
     two = [udd.Measurement(t, {"x": x}), udd.Measurement(t, {"v": v})]
-    said = [udd.fit(order, known, state0=[{}, {}]).doubts for order in (two, two[::-1])]
+    said = [udd.fit(order, baseline, state0=[{}, {}]).doubts for order in (two, two[::-1])]
     assert said[0].missing and said[1].missing
     assert set(said[0].white) == set(said[1].white) == {"x", "v"}

@@ -28,9 +28,9 @@ def test_extrapolation_takes_the_bias_of_the_gain_away() -> None:
     off = ARM.with_parameters({"k": 8.0, "c": 0.4, "g": 1.5})
     plain, corrected = [], []
     for seed in range(8):
-        found = udd.fit(record(seed, 0.3, 0.05), off)
-        plain.append(found.parameters["g"])
-        corrected.append(udd.input_bias(found).corrected["g"])
+        result = udd.fit(record(seed, 0.3, 0.05), off)
+        plain.append(result.parameters["g"])
+        corrected.append(udd.input_bias(result).corrected["g"])
     # Of eight records the plain gain is too small beyond doubt; the corrected one's mean is the truth.
     error = np.std(plain, ddof=1) / np.sqrt(8)
     assert np.mean(plain) < 2.0 - 4.0 * error
@@ -40,8 +40,8 @@ def test_extrapolation_takes_the_bias_of_the_gain_away() -> None:
 
 def test_an_input_that_scatters_is_told() -> None:
     noisy, clean = udd.fit(record(0, 0.3), ARM), udd.fit(record(0, 0.0), ARM)
-    (told,) = noisy.doubts.inputs
-    assert told.name == "u" and abs(told.noise / 0.3 - 1.0) < 0.2
+    (reported,) = noisy.doubts.inputs
+    assert reported.name == "u" and abs(reported.noise / 0.3 - 1.0) < 0.2
     assert "warning: the input u has noise of 0.2" in noisy.summary()
     assert not clean.doubts.inputs
     # That noise is no sign of a missing effect: it makes g sigma/sqrt(2) = 0.42 of v' or some more.
@@ -74,13 +74,13 @@ def test_a_drive_that_is_white_itself_is_not_taken_for_noise(hold: Any, search: 
     t = np.arange(0.0, 20.0, 0.02)
     values = np.sign(rng.normal(size=len(t))) if hold == "zero" else rng.normal(size=len(t))
     drive = udd.InputSignal(t, 3.0 * values, hold=hold)
-    known = udd.Model(["x", "v"], ["v", "-k*x - c*v + u"], {"k": 4.0, "c": 0.3}, inputs=["u"])
+    baseline = udd.Model(["x", "v"], ["v", "-k*x - c*v + u"], {"k": 4.0, "c": 0.3}, inputs=["u"])
     run = udd.simulate(
-        known.with_term("v", "x^3", q=-3.0), t[:-5], [0.5, 0.0], inputs={"u": drive}, method="auto"
+        baseline.with_term("v", "x^3", q=-3.0), t[:-5], [0.5, 0.0], inputs={"u": drive}, method="auto"
     )
     measured = udd.Measurement(t[:-5], {"x": run.x + 1e-3 * rng.normal(size=len(run.x))}, inputs={"u": drive})
-    assert udd.fit(measured, known).doubts.missing
+    assert udd.fit(measured, baseline).doubts.missing
     if not search:
         return
-    found = udd.discover(measured, known)
-    assert any("x^3" in effect.expression for effect in found.effects)
+    result = udd.discover(measured, baseline)
+    assert any("x^3" in effect.expression for effect in result.effects)

@@ -54,12 +54,12 @@ def test_an_encoder_is_told_by_steps_that_drown_all_else(step, noise, encoder):
 
 def test_an_encoder_has_no_camera_and_is_as_good_as_its_steps():
     step = 2 * np.pi / 14400
-    found = udd.fit(swing(step), udd.Pendulum(0.79))
-    assert "theta0" in found.parameters and not {"aside", "above"} & set(found.parameters)
-    sd = float(np.median(found.noise.sd(found.record, found.states[:, 0])))
+    result = udd.fit(swing(step), udd.Pendulum(0.79))
+    assert "theta0" in result.parameters and not {"aside", "above"} & set(result.parameters)
+    sd = float(np.median(result.noise.sd(result.record, result.states[:, 0])))
     assert sd == pytest.approx(step / np.sqrt(12), rel=0.3)
-    assert f"read in steps of {1e3 * step:.3g} mrad" in found.summary()
-    (said,) = found.to_dict()["doubts"]["noise"]
+    assert f"read in steps of {1e3 * step:.3g} mrad" in result.summary()
+    (said,) = result.to_dict()["doubts"]["noise"]
     assert said["name"] == "theta" and said["step"] == pytest.approx(step, rel=1e-6)
 
 
@@ -69,8 +69,8 @@ def test_quantised_columns_of_own_models_are_good_to_their_step():
     x = udd.simulate(model, t, [1.0, 0.0]).state[:, 0]
     # So coarse that most frames repeat the one before: differences alone would say there is no noise.
     step = 0.2
-    found = udd.fit(udd.Measurement(t, {"x": np.round(x / step) * step}), model)
-    assert found.record.sigma[:, 0].min() >= 0.99 * step / np.sqrt(12)
+    result = udd.fit(udd.Measurement(t, {"x": np.round(x / step) * step}), model)
+    assert result.record.sigma[:, 0].min() >= 0.99 * step / np.sqrt(12)
 
 
 def test_readings_that_repeat_tell_what_one_would():
@@ -84,11 +84,11 @@ def test_readings_that_repeat_tell_what_one_would():
 def test_a_film_that_is_better_than_its_geometry_is_told_both_ways():
     """A search counts on no more than half of 5 mrad; what the frames scatter by is told beside it."""
     noise = 1e-3
-    (found,) = udd.discover(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).noise
+    (result,) = udd.discover(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).noise
     # 3000 frames tell their scatter to 1.3 %; three of it.
-    assert found.shown == pytest.approx(noise, rel=0.04)
-    assert found.noise == pytest.approx(2.5e-3, rel=0.01)
-    assert f"theta {1e3 * found.shown:.3g} mrad (counted as 2.5 mrad, because the geometry" in found.text
+    assert result.shown == pytest.approx(noise, rel=0.04)
+    assert result.noise == pytest.approx(2.5e-3, rel=0.01)
+    assert f"theta {1e3 * result.shown:.3g} mrad (counted as 2.5 mrad, because the geometry" in result.text
     # A fit alone takes the frames at their word.
     assert "counted" not in udd.fit(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).summary()
 
@@ -113,10 +113,10 @@ def test_an_encoder_at_rest_shows_nothing_missing_whether_its_noise_is_stated_or
     sd = float(np.hypot(2e-4, step / np.sqrt(12)))
     sigma = np.full((len(t), 1), sd) if stated else None
     measured = udd.Measurement(t, {"theta": np.round(theta / step) * step}, sigma=sigma)
-    found = udd.discover(measured, udd.Pendulum(0.34, k0=0.1))
-    assert found.verdict == "nothing missing" and not found.fit.doubts.missing
+    result = udd.discover(measured, udd.Pendulum(0.34, k0=0.1))
+    assert result.verdict == "nothing missing" and not result.fit.doubts.missing
     # The encoder's own error is told, to what 2e-4 beside it add: not that of 2000 frames that share one.
-    assert found.noise[0].noise == pytest.approx(sd, rel=0.15)
+    assert result.noise[0].noise == pytest.approx(sd, rel=0.15)
 
 
 def test_an_encoder_that_moves_by_few_steps_is_as_good_as_these():
@@ -125,9 +125,9 @@ def test_an_encoder_that_moves_by_few_steps_is_as_good_as_these():
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, 0.04]).state[:, 1]
     measured = udd.Measurement(t, {"theta": np.round(theta / step) * step}, meta={"sensor": "encoder"})
     assert len(np.unique(measured.values)) < 9  # which show no lattice
-    found = udd.fit(measured, udd.Pendulum(0.79))
-    assert found.doubts.sensor[0].noise == pytest.approx(step / np.sqrt(12), rel=0.3)
-    assert "film" not in found.summary()
+    result = udd.fit(measured, udd.Pendulum(0.79))
+    assert result.doubts.sensor[0].noise == pytest.approx(step / np.sqrt(12), rel=0.3)
+    assert "film" not in result.summary()
 
 
 def test_an_encoder_that_never_moves_says_so():

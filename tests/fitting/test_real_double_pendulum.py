@@ -39,7 +39,7 @@ def errors(fit: Fit, other: udd.Measurement) -> list[float]:
 def test_dry_friction_in_the_second_joint_halves_errors_on_a_record_that_no_fit_saw() -> None:
     thin = thinned(read("00"), ["a1", "a2"])
     assert thin.every == 5
-    known = udd.pendulum_chain(
+    baseline = udd.pendulum_chain(
         [0.5594, 0.6043],
         [0.3, 0.2],
         [0.3, 0.18378],
@@ -49,7 +49,7 @@ def test_dry_friction_in_the_second_joint_halves_errors_on_a_record_that_no_fit_
         motors=True,
     )
     free = ["I1", "I2", "r1", "r2", "b1", "b2"]
-    before = fit_record(thin.measurement, record_of(thin.measurement, known), known, free, search=True)
+    before = fit_record(thin.measurement, record_of(thin.measurement, baseline), baseline, free, search=True)
     formula = udd.effects.formula
     after = extend(
         before,
@@ -63,5 +63,5 @@ def test_dry_friction_in_the_second_joint_halves_errors_on_a_record_that_no_fit_
     # Published: 0.078 N m, of a machine whose elasticity, which the model lacks, the number takes up too.
     assert 0.05 < after.parameters["dry.c"] < 0.25
     other = read("05")
-    for one, two in zip(errors(before, other), errors(after, other), strict=True):
-        assert two < 0.5 * one
+    for item, two in zip(errors(before, other), errors(after, other), strict=True):
+        assert two < 0.5 * item

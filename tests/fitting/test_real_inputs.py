@@ -40,9 +40,9 @@ def part(table: Any, first: int, last: int, hold: Any) -> udd.Measurement:
 @pytest.mark.parametrize(("hold", "samples"), [("linear", 0.0), ("zero", -0.5)])
 def test_the_delay_of_the_silverbox_is_that_of_its_hold(table: Any, hold: Any, samples: float) -> None:
     model, free = duffing(offset=True)
-    found = udd.fit(part(table, 50_000, 54_096, hold), model, free=free)
+    result = udd.fit(part(table, 50_000, 54_096, hold), model, free=free)
     # A held sample comes half a sample late; so good is the circuit's model by a tenth of one.
-    assert abs(found.parameters["tau"] * RATE - samples) < 0.1
+    assert abs(result.parameters["tau"] * RATE - samples) < 0.1
 
 
 def test_the_offset_explains_most_of_what_the_duffing_oscillator_misses(table: Any) -> None:
@@ -50,10 +50,10 @@ def test_the_offset_explains_most_of_what_the_duffing_oscillator_misses(table: A
     errors = []
     for offset in (False, True):
         model, free = duffing(offset)
-        found = udd.fit(part(table, 50_000, 54_096, "cubic"), model, free=free).model
-        assert isinstance(found, type(model))
+        result = udd.fit(part(table, 50_000, 54_096, "cubic"), model, free=free).model
+        assert isinstance(result, type(model))
         run = udd.simulate(
-            found.with_inputs(arrow.inputs),
+            result.with_inputs(arrow.inputs),
             arrow.t,
             [arrow["y"][0], 0.0],
             method="auto",

@@ -23,12 +23,12 @@ def records(number: int, frames: int, noise: float = 1e-2) -> list[udd.Measureme
 
 def test_many_short_records_are_fitted_together():
     many = records(20, 8)
-    found = udd.fit(many, SPRING.with_parameters({"k": 8.0, "c": 0.2}))
+    result = udd.fit(many, SPRING.with_parameters({"k": 8.0, "c": 0.2}))
     for name, value in (("k", 9.0), ("c", 0.1)):
-        assert abs(found.parameters[name] - value) < 3.5 * found.errors[name] and found.errors[name] < 0.1
-    assert not found.doubts.missing and 0.5 < found.scatter < 1.6
+        assert abs(result.parameters[name] - value) < 3.5 * result.errors[name] and result.errors[name] < 0.1
+    assert not result.doubts.missing and 0.5 < result.scatter < 1.6
     # The noise is that of all, not what eight frames happen to show.
-    sd = found.noise.sd(found.record, found.blurring)[:, 0]
+    sd = result.noise.sd(result.record, result.blurring)[:, 0]
     assert np.ptp(sd) < 1e-9 and sd.mean() == pytest.approx(1e-2, rel=0.3)
 
 
@@ -39,8 +39,8 @@ def test_short_records_of_a_pendulum_and_one_at_rest():
     for amplitude in random.uniform(-1, 1, 12):
         theta = udd.simulate(udd.Pendulum(0.8, k0=0.01), t, [0.0, amplitude]).state[:, 1]
         many.append(udd.Measurement(t, {"theta": theta + 1e-3 * random.standard_normal(8)}))
-    found = udd.fit(many, udd.Pendulum(0.82), camera=False)
-    pace = found.parameters["length"] / found.parameters["inertia"]
+    result = udd.fit(many, udd.Pendulum(0.82), camera=False)
+    pace = result.parameters["length"] / result.parameters["inertia"]
     assert pace == pytest.approx(1 / 0.8, rel=0.01)
     still = udd.Measurement(t, {"x": np.zeros(8)})
     assert udd.fit([*records(6, 8), still], SPRING).converged

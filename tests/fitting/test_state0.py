@@ -27,10 +27,10 @@ def seen_x() -> udd.Measurement:
 def test_a_start_of_hidden_states_leads_a_fit_to_them():
     lost = udd.fit(seen_x(), KNOWN)
     assert not lost.converged or lost.parameters["r"] > 40  # from zero it goes elsewhere
-    found = udd.fit(seen_x(), KNOWN, state0={"y": -6.0, "z": 22.0})
-    assert found.converged
+    result = udd.fit(seen_x(), KNOWN, state0={"y": -6.0, "z": 22.0})
+    assert result.converged
     for name, true in {"s": 10.0, "r": 28.0, "b": 8 / 3}.items():
-        assert abs(found.parameters[name] - true) < 4 * found.errors[name]
+        assert abs(result.parameters[name] - true) < 4 * result.errors[name]
 
 
 def test_of_several_measurements_each_may_have_its_own():

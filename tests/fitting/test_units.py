@@ -43,18 +43,18 @@ def scaled(measured: udd.Measurement, **factors: float) -> udd.Measurement:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_strong_effect_is_no_wrong_unit(hidden, seed):
     # The fit may go anywhere, and does: what the effect does goes into drive, clock and scale.
-    found = udd.fit(record(hidden, seed), udd.Disk(DRIVE))
-    assert found.parameters["W"] > 0 and abs(found.parameters["clock"]) < 0.5
+    result = udd.fit(record(hidden, seed), udd.Disk(DRIVE))
+    assert result.parameters["W"] > 0 and abs(result.parameters["clock"]) < 0.5
 
 
 def test_a_strong_relaxation_is_found_with_the_drive_as_stated():
     truth = udd.Disk(DRIVE, effects=STRONG["relaxation"])
     measured, _states = simulated.film(truth, np.random.default_rng(2), 40.0)
-    found = udd.discover(measured, udd.Disk(DRIVE))
-    assert found.verdict == "effect identified"
-    assert {"relaxation", "slip"} >= {f.effect.name for f in found.effects} and len(found.effects) == 1
-    assert abs(found.fit.parameters["W"] / DRIVE - 1) < 0.01
-    ((pull, error),) = [(f.parameters[a], f.errors[a]) for f in found.effects for a in f.effect.amplitudes]
+    result = udd.discover(measured, udd.Disk(DRIVE))
+    assert result.verdict == "effect identified"
+    assert {"relaxation", "slip"} >= {f.effect.name for f in result.effects} and len(result.effects) == 1
+    assert abs(result.fit.parameters["W"] / DRIVE - 1) < 0.01
+    ((pull, error),) = [(f.parameters[a], f.errors[a]) for f in result.effects for a in f.effect.amplitudes]
     pull, error = (pull, error) if pull > 1 else (pull / DRIVE, error / DRIVE)  # a slip b W Z
     assert abs(pull - 12.0) < 4.5 * np.hypot(error, 0.004 * 12)
 
@@ -64,17 +64,17 @@ def fitted(measured: udd.Measurement, model: udd.Model) -> tuple[udd.Fit | None,
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
-            found = udd.fit(measured, model)
+            result = udd.fit(measured, model)
         except FitError as error:
-            return None, f"{error}; {'; '.join(str(one.message) for one in said)}"
-    return found, "; ".join(str(one.message) for one in said)
+            return None, f"{error}; {'; '.join(str(entry.message) for entry in said)}"
+    return result, "; ".join(str(item.message) for item in said)
 
 
 @pytest.mark.parametrize("hidden", STRONG)
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10, 100, 1000])
 def test_a_drive_in_another_unit_is_reported(hidden, factor):
-    found, said = fitted(record(hidden), udd.Disk(factor * DRIVE))
-    if found is None or not abs(found.parameters["W"] / DRIVE - 1) < 0.05:
+    result, said = fitted(record(hidden), udd.Disk(factor * DRIVE))
+    if result is None or not abs(result.parameters["W"] / DRIVE - 1) < 0.05:
         assert "check the drive and its unit" in said
         assert f"drive of {DRIVE:.3g} m/s, where {factor * DRIVE:g} m/s was stated" in said
 
@@ -110,10 +110,10 @@ def test_numbers_that_cannot_be_a_pendulums_are_asked_about(factors):
 
 def test_an_angle_in_degrees_that_may_be_one_in_rad_is_a_remark():
     """Three degrees: less than half a turn if it were in rad. The fit is that of the numbers as stated."""
-    found, said = fitted(scaled(swing(0.05), theta=180 / np.pi), udd.Pendulum(0.8, k0=0.02))
+    result, said = fitted(scaled(swing(0.05), theta=180 / np.pi), udd.Pendulum(0.8, k0=0.02))
     assert "whose angle is in degrees, not in rad; the fit continues with the given units" in said
-    assert found is not None and "degrees" in found.unit_doubt
-    assert any("degrees" in line for line in found.doubts.sentences) and "degrees" in found.summary()
+    assert result is not None and "degrees" in result.unit_doubt
+    assert any("degrees" in line for line in result.doubts.sentences) and "degrees" in result.summary()
 
 
 @pytest.mark.parametrize(("amplitude", "length"), [(0.7, 0.08), (0.05, 8.0), (0.7, 80.0)])
@@ -148,11 +148,11 @@ def test_wrong_units_are_refused_on_the_last_part_of_a_record(monkeypatch: pytes
 @pytest.mark.parametrize("factor", [1.0, 0.4, 2.5])
 def test_a_length_that_is_somewhat_off_is_no_wrong_unit(amplitude, factor):
     """Neither is the angle in degrees, nor the length in dm: the fit finds the length, and says so."""
-    found, said = fitted(swing(amplitude), udd.Pendulum(0.8 * factor, k0=0.02))
-    assert said == "" and found is not None and found.unit_doubt is None
-    pace = found.parameters["length"] / found.parameters["inertia"]
+    result, said = fitted(swing(amplitude), udd.Pendulum(0.8 * factor, k0=0.02))
+    assert said == "" and result is not None and result.unit_doubt is None
+    pace = result.parameters["length"] / result.parameters["inertia"]
     assert pace == pytest.approx(1 / 0.8, rel=2e-3)
-    assert bool(found.doubts.ran_off) == (factor != 1.0)
+    assert bool(result.doubts.ran_off) == (factor != 1.0)
 
 
 def test_a_pendulum_that_goes_over_the_top_is_in_rad_whatever_its_length():
@@ -172,8 +172,8 @@ def test_a_record_finer_than_usual_noise_is_in_rad():
     theta = udd.simulate(udd.Pendulum(0.8, k0=0.01, effects=drag), t, [0.0, np.pi / 2]).state[:, 1]
     noise = 1e-4 * np.random.default_rng(2).standard_normal(len(t))
     measured = udd.Measurement(t, {"theta": theta + noise}, sigma=np.full((len(t), 1), 1e-4))
-    found, said = fitted(measured, udd.Pendulum(2.0, k0=0.02))
-    assert said == "" and found is not None
+    result, said = fitted(measured, udd.Pendulum(2.0, k0=0.02))
+    assert said == "" and result is not None
 
 
 @pytest.mark.parametrize(("amplitude", "sign"), [(0.05, 1), (0.7, -1)])
@@ -205,26 +205,26 @@ def test_a_pendulum_may_go_round():
 
 
 def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
-    found = discovered.disk()
-    assert found.remarks == [] and discovered.nothing().remarks == []
-    fit = found.fit
+    result = discovered.disk()
+    assert result.remarks == [] and discovered.nothing().remarks == []
+    fit = result.fit
     far = replace(fit, parameters={**fit.parameters, "W": 0.2 * discovered.DRIVE})
-    doubted = replace(found, fit=far)
+    doubted = replace(result, fit=far)
     (remark,) = doubted.remarks
     assert remark.startswith("A parameter is far from its given value: W = 0.0084 ± ")
     # It stands beside the verdict, not instead of it.
-    assert as_text(summary_of(doubted)).splitlines()[0] == as_text(summary_of(found)).splitlines()[0]
+    assert as_text(summary_of(doubted)).splitlines()[0] == as_text(summary_of(result)).splitlines()[0]
     assert f"  {remark}\n".replace("±", "+-") in as_text(summary_of(doubted))
     doubted.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert f'<p class="warn">{remark}</p>' in page and "<strong>effect" in page
-    held = {name: value for name, value in fit.parameters.items() if name not in ("W", "clock")}
+    fixed = {name: value for name, value in fit.parameters.items() if name not in ("W", "clock")}
     (remark,) = replace(
-        found,
+        result,
         fit=replace(
             fit,
-            parameters=held,
-            problem=replace(fit.problem, free=tuple(f for f in fit.problem.free if f.name in held)),
+            parameters=fixed,
+            problem=replace(fit.problem, free=tuple(f for f in fit.problem.free if f.name in fixed)),
         ),
     ).remarks
     assert remark.startswith("Fixed at their given values, because they diverge if they are free: W, clock.")

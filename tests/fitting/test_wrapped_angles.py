@@ -28,18 +28,18 @@ def wrapped(measured: udd.Measurement, low: float = -np.pi) -> udd.Measurement:
 @pytest.mark.parametrize("low", [-np.pi, 0.0])
 def test_a_wrapped_angle_of_any_name_is_fitted_as_the_continuous_one(low):
     start = ROTOR.with_parameters({"k": 8.5, "c": 0.1})
-    right, found = udd.fit(rotor(), start), udd.fit(wrapped(rotor(), low), start)
-    assert not right.doubts.missing and not found.doubts.missing
+    right, result = udd.fit(rotor(), start), udd.fit(wrapped(rotor(), low), start)
+    assert not right.doubts.missing and not result.doubts.missing
     assert right.errors["k"] < 2e-3
     for name in ("k", "c"):
-        assert found.parameters[name] == pytest.approx(right.parameters[name], abs=1e-3 * right.errors[name])
-        assert found.errors[name] == pytest.approx(right.errors[name], rel=1e-3)
-    assert np.abs(np.diff(found.measurement["q"])).max() < 0.5
+        assert result.parameters[name] == pytest.approx(right.parameters[name], abs=1e-3 * right.errors[name])
+        assert result.errors[name] == pytest.approx(right.errors[name], rel=1e-3)
+    assert np.abs(np.diff(result.measurement["q"])).max() < 0.5
 
 
 def test_nothing_is_missing_in_a_wrapped_angle():
-    found = udd.discover(wrapped(rotor(600)), ROTOR)
-    assert found.verdict == "nothing missing"
+    result = udd.discover(wrapped(rotor(600)), ROTOR)
+    assert result.verdict == "nothing missing"
 
 
 def test_two_wrapped_angles_with_gaps_and_sensors():
@@ -82,8 +82,8 @@ def test_frames_that_are_not_usable_move_no_other_by_a_turn():
 def test_what_is_no_angle_of_the_model_stays_and_is_reported():
     plain = udd.Model(["q", "v"], ["v", "-k*sin(q) - c*v"], {"k": 9.0, "c": 0.15})
     with pytest.warns(UserWarning, match=r'q jumps by a turn.* angles=\["q"\] to udd.Model'):
-        found = udd.fit(wrapped(rotor()), plain)
-    assert np.ptp(found.measurement["q"]) < TURN
+        result = udd.fit(wrapped(rotor()), plain)
+    assert np.ptp(result.measurement["q"]) < TURN
 
 
 def test_the_kind_or_the_model_says_which_columns_are_angles(tmp_path: Path):

@@ -287,12 +287,12 @@ def test_numpy_archives(tmp_path: Path) -> None:
         m = read_measurement(path, inputs=["u"])
     np.testing.assert_allclose(m.t, T, rtol=1e-15)
     assert np.array_equal(m["theta"], THETA) and np.array_equal(m["u"], U) and m.meta["W"] == 0.04
-    one = tmp_path / "run.npy"
-    np.save(one, np.column_stack([T, THETA, U]))
-    m = read_measurement(one, columns="t,theta,_")
+    item = tmp_path / "run.npy"
+    np.save(item, np.column_stack([T, THETA, U]))
+    m = read_measurement(item, columns="t,theta,_")
     assert np.array_equal(m["theta"], THETA)
     with pytest.raises(MeasurementError, match="columns gives 2 names, but the file has column_1, column_2"):
-        read_measurement(one, columns="t,theta")
+        read_measurement(item, columns="t,theta")
 
 
 class Trap:

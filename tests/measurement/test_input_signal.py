@@ -19,8 +19,8 @@ def test_straight_lines_are_numpys() -> None:
 
 
 def test_a_held_sample_lasts_until_the_next() -> None:
-    held = udd.InputSignal(T, U, hold="zero")
-    assert held([0.0, 0.29, 0.3, 1.19, 1.2]).tolist() == [1.0, 1.0, -2.0, 0.7, 3.0]
+    fixed = udd.InputSignal(T, U, hold="zero")
+    assert fixed([0.0, 0.29, 0.3, 1.19, 1.2]).tolist() == [1.0, 1.0, -2.0, 0.7, 3.0]
 
 
 def test_the_spline_is_natural() -> None:

@@ -25,9 +25,9 @@ def test_definitions_of_cassy_name_the_columns(tmp_path: Path):
     path = tmp_path / "cassy.txt"
     path.write_bytes(("\ufeff" + "\r\n".join([*head, *rows]) + "\r\n").encode())
     with pytest.warns(UserWarning, match="theta from ° to rad"):
-        found = udd.read_measurement(path, columns="t=Zeit,theta=Winkel")
-    assert len(found) == 40 and np.allclose(found["theta"], np.radians(ANGLE), atol=1e-7)
-    assert found.t[-1] == pytest.approx(3.9)
+        result = udd.read_measurement(path, columns="t=Zeit,theta=Winkel")
+    assert len(result) == 40 and np.allclose(result["theta"], np.radians(ANGLE), atol=1e-7)
+    assert result.t[-1] == pytest.approx(3.9)
 
 
 @pytest.mark.parametrize(
@@ -43,15 +43,15 @@ def test_definitions_of_cassy_name_the_columns(tmp_path: Path):
 )
 def test_units_may_stand_below_the_names(tmp_path: Path, lines, columns, units):
     with pytest.warns(UserWarning, match="deg|°"):
-        found = udd.read_measurement(written(tmp_path / "two.csv", lines), columns=columns)
-    assert len(found) == 40 and np.allclose(found["theta"], np.radians(ANGLE), atol=1e-6)
-    assert found.t[-1] == pytest.approx(3.9 * units)
+        result = udd.read_measurement(written(tmp_path / "two.csv", lines), columns=columns)
+    assert len(result) == 40 and np.allclose(result["theta"], np.radians(ANGLE), atol=1e-6)
+    assert result.t[-1] == pytest.approx(3.9 * units)
 
 
 def test_a_unit_of_an_input_below_its_name_is_kept(tmp_path: Path):
     path = written(tmp_path / "volts.csv", ["Time,Motor", "s,V"])
-    found = udd.read_measurement(path, columns={"x": "Motor"}, inputs={"u": "Motor"})
-    assert found.meta["input_units"] == {"u": "V"}
+    result = udd.read_measurement(path, columns={"x": "Motor"}, inputs={"u": "Motor"})
+    assert result.meta["input_units"] == {"u": "V"}
 
 
 @pytest.mark.parametrize("end", [";0.1234", "4.0", ";"])
@@ -61,8 +61,8 @@ def test_a_last_row_that_is_cut_off_is_passed_over(tmp_path: Path, end: str):
         assert len(udd.read_measurement(path, columns={"theta": "Angle1"})) == 40
         return
     with pytest.warns(UserWarning, match=r"line 42, the last, .* is passed over"):
-        found = udd.read_measurement(path, columns={"theta": "Angle1"})
-    assert len(found) == 40
+        result = udd.read_measurement(path, columns={"theta": "Angle1"})
+    assert len(result) == 40
 
 
 def test_a_row_without_a_time_in_the_middle_is_refused(tmp_path: Path):

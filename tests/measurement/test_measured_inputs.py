@@ -29,9 +29,9 @@ def driven() -> Measurement:
 
 def same_inputs(a: Measurement, b: Measurement) -> None:
     assert list(a.inputs) == list(b.inputs)
-    for one, other in zip(a.inputs.values(), b.inputs.values(), strict=True):
-        assert one.hold == other.hold
-        assert np.array_equal(one.t, other.t) and np.array_equal(one.values, other.values)
+    for item, other in zip(a.inputs.values(), b.inputs.values(), strict=True):
+        assert item.hold == other.hold
+        assert np.array_equal(item.t, other.t) and np.array_equal(item.values, other.values)
 
 
 def test_an_array_is_sampled_at_the_rows_and_a_signal_at_its_own_times() -> None:

@@ -285,11 +285,11 @@ def test_a_unit_that_cannot_be_or_is_not_known_is_refused(tmp_path: Path, head: 
 def test_of_an_own_model_times_and_angles_are_converted_and_lengths_stay(tmp_path: Path) -> None:
     head = "t (ms),q (deg),w (deg/s),x (mm),u (V)"
     path = write(tmp_path, "\n".join([head, *(f"{40 * i},180,90,5,3" for i in range(20))]) + "\n")
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning) as reported:
         m = read_measurement(path, states=["q", "w", "x", "u"])
     np.testing.assert_allclose(m.t, np.arange(20) / 25)
     np.testing.assert_allclose(m.values[3], [np.pi, np.pi / 2, 5, 3])
-    kept, converted = (str(one.message) for one in told)
+    kept, converted = (str(item.message) for item in reported)
     assert kept == f'{path}: x stays in mm (columns="x=x" makes it m)'
     assert "converted t from ms to s, q from deg to rad, w from deg/s to rad/s, as" in converted
     with pytest.warns(UserWarning, match="x from mm to m"):
@@ -316,8 +316,8 @@ def test_names_that_only_look_like_units_stay(tmp_path: Path) -> None:
     rows = "\n".join(f"{i / 25},{i},{0.01 * i},{i}" for i in range(20))
     m = read_measurement(write(tmp_path, "t,t_ms,theta,x_mm\n" + rows + "\n"))  # the last is not asked for
     assert m.t[3] == 0.12 and m["theta"][3] == 0.03
-    own = read_measurement(tmp_path / "bad.csv", states=["x_mm"])
-    assert own["x_mm"][3] == 3.0
+    each = read_measurement(tmp_path / "bad.csv", states=["x_mm"])
+    assert each["x_mm"][3] == 3.0
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the shared real data are not here")

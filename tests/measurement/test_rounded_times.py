@@ -27,9 +27,9 @@ def test_a_rounded_constant_rate_is_recognised(rate, rounding, lost, n):
         line = np.polyval(np.polyfit(number, t, 1), number)
         assert np.abs(t - line).max() < 1e-9 or (lost and rounding * rate > 0.25)
         return
-    found = clock.all_at(t)
-    assert np.abs(found - t).max() <= 0.51 * rounding
-    assert np.ptp(found - exact) < rounding / 2 or n < 50
+    result = clock.all_at(t)
+    assert np.abs(result - t).max() <= 0.51 * rounding
+    assert np.ptp(result - exact) < rounding / 2 or n < 50
     assert 1 / clock.period == pytest.approx(rate, rel=4 * rounding / exact[-1])
 
 
@@ -69,10 +69,10 @@ def test_nothing_is_missing_in_a_table_whose_times_are_rounded(tmp_path: Path):
     read = udd.read_measurement(tmp_path / "ms.csv")
     assert np.abs(read.t - exact.t).max() < 1e-9
     assert read.meta["clock"] == "times are rounded to 1 ms: they are taken as those of 60 Hz"
-    right, found = udd.fit(exact, udd.Pendulum(0.8)), udd.fit(read, udd.Pendulum(0.8))
-    assert not found.doubts.missing and read.meta["clock"] in found.summary()
-    assert found.parameters["k0"] == pytest.approx(right.parameters["k0"], abs=0.1 * right.errors["k0"])
-    assert found.errors["k0"] == pytest.approx(right.errors["k0"], rel=0.05)
+    right, result = udd.fit(exact, udd.Pendulum(0.8)), udd.fit(read, udd.Pendulum(0.8))
+    assert not result.doubts.missing and read.meta["clock"] in result.summary()
+    assert result.parameters["k0"] == pytest.approx(right.parameters["k0"], abs=0.1 * right.errors["k0"])
+    assert result.errors["k0"] == pytest.approx(right.errors["k0"], rel=0.05)
     # What the package writes is read back as it was.
     read.to_csv(tmp_path / "again.csv")
     assert np.array_equal(udd.read_measurement(tmp_path / "again.csv").t, read.t)
@@ -81,7 +81,7 @@ def test_nothing_is_missing_in_a_table_whose_times_are_rounded(tmp_path: Path):
 def test_arrays_with_rounded_times_are_fitted_as_they_were_taken():
     """An input that was sampled with the rows goes with them."""
     exact = swing(np.arange(240) / 60)
-    known = udd.Model(
+    baseline = udd.Model(
         ["theta", "v"],
         ["v", "-k*sin(theta) - c*v + u"],
         {"k": 12.0, "c": 0.02},
@@ -90,7 +90,7 @@ def test_arrays_with_rounded_times_are_fitted_as_they_were_taken():
     )
     rounded = udd.Measurement(np.round(exact.t, 3), {"theta": exact["theta"]}, exact.sigma,
                               inputs={"u": np.zeros(240)})  # fmt: skip
-    found = udd.fit(rounded, known)
-    assert not found.doubts.missing
-    assert np.abs(found.measurement.t - exact.t).max() < 1e-9
-    assert found.measurement.on_rows("u")
+    result = udd.fit(rounded, baseline)
+    assert not result.doubts.missing
+    assert np.abs(result.measurement.t - exact.t).max() < 1e-9
+    assert result.measurement.on_rows("u")

@@ -35,7 +35,7 @@ def test_the_hyperbolic_sine_of_small_numbers_is_not_zero(method: str) -> None:
     sizes = np.array([1e-300, 1e-139, 1e-20, 1e-8, 0.1, 1.0, 30.0, 700.0])
     law = udd.Model(["x"], ["sinh(x)"])
     for sign in (1.0, -1.0):
-        found = law.rates(0.0, sign * sizes[:, None])[:, 0]
-        np.testing.assert_allclose(found, np.sinh(sign * sizes), rtol=1e-14)
+        result = law.rates(0.0, sign * sizes[:, None])[:, 0]
+        np.testing.assert_allclose(result, np.sinh(sign * sizes), rtol=1e-14)
     run = udd.simulate(law, 2.0, [1e-20], method=method, atol=1e-40)
     assert run.state[-1, 0] == pytest.approx(1e-20 * np.exp(2.0), rel=1e-7)

@@ -84,9 +84,9 @@ def test_what_a_gyroscope_shows_is_enough_to_find_drag() -> None:
     drag = udd.effects.quadratic_drag(c=0.02)
     rate = udd.simulate(udd.Pendulum(0.5, k0=0.002, effects=drag), t, [0.0, 1.2]).Omega
     seen = rate + 0.05 + 0.01 * np.random.default_rng(3).normal(size=len(t))
-    known = udd.Pendulum(0.5, k0=0.002).with_gyroscope()
-    found = udd.discover(udd.Measurement(t, {"Omega": seen}), known)
-    assert [added.title for added in found.effects] == ["abs(Omega)*Omega in Omega'"]
-    (c,) = found.effects[0].effect.values
+    baseline = udd.Pendulum(0.5, k0=0.002).with_gyroscope()
+    result = udd.discover(udd.Measurement(t, {"Omega": seen}), baseline)
+    assert [added.title for added in result.effects] == ["abs(Omega)*Omega in Omega'"]
+    (c,) = result.effects[0].effect.values
     # Over the inertia, 0.25 m^2.
-    assert abs(c + 0.02 / 0.25) < 4 * found.fit.errors["abs_Omega_Omega_in_Omega.c"]
+    assert abs(c + 0.02 / 0.25) < 4 * result.fit.errors["abs_Omega_Omega_in_Omega.c"]

@@ -185,9 +185,9 @@ def test_expressions_of_sympy_serve_as_text() -> None:
     with pytest.raises(ModelError, match="contains a derivative"):
         udd.Model(["x"], [x.diff(t)])
     c, z = sympy.symbols("c Z")
-    own = formula("torque", c * sympy.tanh(z), c=0.1)
+    each = formula("torque", c * sympy.tanh(z), c=0.1)
     np.testing.assert_array_equal(
-        udd.Disk(0.1, effects=own).rates(0.0, X),
+        udd.Disk(0.1, effects=each).rates(0.0, X),
         udd.Disk(0.1, effects=formula("torque", "c*tanh(Z)", c=0.1)).rates(0.0, X),
     )
 
@@ -269,20 +269,20 @@ def test_auto_takes_another_method_where_there_is_no_series() -> None:
 
 
 def test_the_exponents_of_lorenz_are_the_known_ones() -> None:
-    found = udd.lyapunov_spectrum(lorenz(), state0=[1.0, 1.0, 1.0], t=1000.0, tol=1.0)
+    result = udd.lyapunov_spectrum(lorenz(), state0=[1.0, 1.0, 1.0], t=1000.0, tol=1.0)
     # Published: 0.9056, 0, -14.5723 (Sprott, Chaos and Time-Series Analysis, 2003); the errors are found.
-    assert abs(found.exponents[0] - 0.9056) < 4.0 * found.standard_errors[0] < 0.5
+    assert abs(result.exponents[0] - 0.9056) < 4.0 * result.standard_errors[0] < 0.5
     # The sum is minus the rate at which volumes shrink, everywhere the same.
-    assert found.exponents.sum() == pytest.approx(-(10.0 + 1.0 + 8.0 / 3.0), abs=1e-6)
-    assert found.verdict == "chaos"
+    assert result.exponents.sum() == pytest.approx(-(10.0 + 1.0 + 8.0 / 3.0), abs=1e-6)
+    assert result.verdict == "chaos"
 
 
 def test_sections_and_ensembles_are_those_of_the_built_in_model() -> None:
     dle = udd.Model(["omega", "y", "z"], ["y - omega", "omega*z", "w - omega*y"], {"w": 2.0})
     start = [1.0, 1.0, 0.01]
-    own, built_in = (udd.poincare(m, "z", 20, state0=start) for m in (dle, udd.DLE(2.0)))
+    each, built_in = (udd.poincare(m, "z", 20, state0=start) for m in (dle, udd.DLE(2.0)))
     # Packets and single runs have the same bits, and so have the two laws.
-    np.testing.assert_array_equal(own.state, built_in.state)
+    np.testing.assert_array_equal(each.state, built_in.state)
     t, starts = np.linspace(0, 5, 6), np.random.default_rng(1).normal(size=(5, 3))
     runs = [udd.ensemble(m, t, starts, method="dopri5").state for m in (dle, udd.DLE(2.0))]
     np.testing.assert_array_equal(*runs)
@@ -295,7 +295,7 @@ def test_sections_and_ensembles_are_those_of_the_built_in_model() -> None:
 def test_both_wells_have_their_basin() -> None:
     pytest.importorskip("xarray", reason="the extra scale is not installed")
     wells = udd.Model(["x", "v"], ["v", "x - x^3 - c*v"], {"c": 0.3})
-    found = udd.basins(wells, {"x": np.linspace(-1.5, 1.5, 6), "v": np.array([-0.5, 0.5])})
+    result = udd.basins(wells, {"x": np.linspace(-1.5, 1.5, 6), "v": np.array([-0.5, 0.5])})
     # The law is odd, and so is the grid.
-    np.testing.assert_allclose(found.fraction, [0.5, 0.5])
-    np.testing.assert_allclose(np.sort(found.orbit_x.values.ravel()), [-1.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(result.fraction, [0.5, 0.5])
+    np.testing.assert_allclose(np.sort(result.orbit_x.values.ravel()), [-1.0, 1.0], atol=1e-9)

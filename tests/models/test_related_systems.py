@@ -24,9 +24,9 @@ def test_lorenz_in_the_variables_of_the_dle_is_lorenz() -> None:
     sigma = 1 / epsilon
     r = w * sigma**2 / b
     omega, y, z = last(systems.scaled_lorenz(w, epsilon, b), 5.0, [1.0, 1.0, 0.01])
-    own = last(systems.lorenz(sigma, r, b), 5.0 / sigma, [sigma, sigma, r - sigma * 0.01])
+    each = last(systems.lorenz(sigma, r, b), 5.0 / sigma, [sigma, sigma, r - sigma * 0.01])
     # Both are exact: what is left is the integration error, 1e-12 grown by the chaos of 5 units of time.
-    np.testing.assert_allclose([sigma * omega, sigma * y, r - sigma * z], own, rtol=1e-9)
+    np.testing.assert_allclose([sigma * omega, sigma * y, r - sigma * z], each, rtol=1e-9)
 
 
 def test_lorenz_becomes_the_dle_as_diffusion_vanishes() -> None:
@@ -39,9 +39,9 @@ def test_lorenz_becomes_the_dle_as_diffusion_vanishes() -> None:
 
 
 def test_lorenz_strongly_driven_has_the_exponent_of_the_dle() -> None:
-    near = udd.lyapunov(systems.scaled_lorenz(1.0, 1e-4), t=2e4, tol=0.005, state0=[1.0, 1.0, 0.01])
+    close = udd.lyapunov(systems.scaled_lorenz(1.0, 1e-4), t=2e4, tol=0.005, state0=[1.0, 1.0, 0.01])
     # 0.21016 is the DLE's; the error bar of 2e4 units of time is 0.003.
-    assert near == pytest.approx(0.21016, abs=0.012)
+    assert close == pytest.approx(0.21016, abs=0.012)
 
 
 @pytest.mark.parametrize("leakage", [0.0, 0.05])
@@ -75,15 +75,15 @@ def test_the_disk_without_a_drive_is_a_pendulum_in_si_units() -> None:
     disk = last(
         udd.Disk(0.0, k0=k, k1=k, k2=0.0), 3.0, [0, -radius * np.sin(theta), -radius * np.cos(theta), 0]
     )
-    own = last(udd.Pendulum(radius, inertia=0.08**2 / 2 + radius**2, k0=k), 3.0, [0.0, theta])
-    np.testing.assert_allclose(disk[0], own[0], rtol=1e-9)
-    np.testing.assert_allclose(disk[3], own[1] - theta, rtol=1e-9)
+    each = last(udd.Pendulum(radius, inertia=0.08**2 / 2 + radius**2, k0=k), 3.0, [0.0, theta])
+    np.testing.assert_allclose(disk[0], each[0], rtol=1e-9)
+    np.testing.assert_allclose(disk[3], each[1] - theta, rtol=1e-9)
 
 
 def test_a_steady_torque_turns_the_pendulum_or_holds_it() -> None:
-    held = last(systems.pendulum(1.0, 1.0, 0.9), 60.0, [0.0, 0.0])
+    fixed = last(systems.pendulum(1.0, 1.0, 0.9), 60.0, [0.0, 0.0])
     # It rests where gravity balances the torque; exp(-60/2) of the start is left.
-    np.testing.assert_allclose(held, [0.0, np.arcsin(0.9)], atol=1e-9)
+    np.testing.assert_allclose(fixed, [0.0, np.arcsin(0.9)], atol=1e-9)
     turning = systems.pendulum(1.0, 1.0, 3.0)
     rounds = udd.simulate(turning, np.arange(0, 80, 0.01), [0.0, 0.0], rtol=1e-10)
     passes = np.interp(2 * np.pi * np.arange(15, 25), rounds.theta, rounds.t)
@@ -173,8 +173,10 @@ def test_the_droplets_waves_are_an_integral_over_its_past() -> None:
         {},
     )
     v, y, z, x = udd.simulate(model, t, [0.4, 0.0, 0.0, 0.0], method="taylor", **TIGHT).state.T
-    own = udd.simulate(systems.walking_droplet(R, memory), t, [0.4, 0.0, 0.0], method="taylor", **TIGHT).state
-    np.testing.assert_allclose(own, np.stack([v, y, z], axis=1), atol=1e-9)
+    each = udd.simulate(
+        systems.walking_droplet(R, memory), t, [0.4, 0.0, 0.0], method="taylor", **TIGHT
+    ).state
+    np.testing.assert_allclose(each, np.stack([v, y, z], axis=1), atol=1e-9)
     weight = R * np.exp(-(t[-1] - t) / memory)
     # Simpson's rule over 6000 steps of 0.001: its error is below 1e-10.
     assert y[-1] == pytest.approx(simpson(weight * np.sin(x[-1] - x), x=t), abs=1e-8)

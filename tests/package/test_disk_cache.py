@@ -87,5 +87,5 @@ def test_the_second_of_two_processes_waits_for_the_first(tmp_path: Path) -> None
     log = tmp_path / "log"
     command = [sys.executable, str(script), str(log)]
     both = [subprocess.Popen(command, env=environment) for _ in range(2)]
-    assert [one.wait(60) for one in both] == [0, 0]
+    assert [item.wait(60) for item in both] == [0, 0]
     assert log.read_text() == "computed\n"

@@ -75,12 +75,12 @@ x = np.ones((10**6, 1))
 
 def answer(setup: str, call: str, after: str = "") -> tuple[float, bool]:
     """Time until a call ends, in s, and whether xarray was imported by then; of three, on a busy machine."""
-    found: list[tuple[float, bool]] = []
-    while len(found) < 3 and not any(wall < 0.2 for wall, _ in found):
+    result: list[tuple[float, bool]] = []
+    while len(result) < 3 and not any(wall < 0.2 for wall, _ in result):
         code = CODE.format(setup=setup, call=call, after=after)
         wall, xarray = output_of(code, 60.0).splitlines()[0].split()
-        found.append((float(wall), xarray == "True"))
-    return min(found)
+        result.append((float(wall), xarray == "True"))
+    return min(result)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

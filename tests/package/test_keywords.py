@@ -17,9 +17,9 @@ RUN = udd.simulate(udd.Disk(0.04), 1.0, [0.0, 1e-3, 0.04, 0.0])
 def test_a_name_of_before_works_with_a_warning() -> None:
     rest = udd.equilibria(udd.DLE(2.5, B=0.2), initial_states=8)[0]
     now = udd.continuation(rest, "w", (1.0, 9.0), ds=0.05, max_points=30)
-    with pytest.warns(DeprecationWarning, match="called ds= now") as told:
+    with pytest.warns(DeprecationWarning, match="called ds= now") as reported:
         before = udd.continuation(rest, "w", (1.0, 9.0), step=0.05, max_points=30)  # type: ignore[call-arg]
-    assert told[0].filename == __file__
+    assert reported[0].filename == __file__
     assert before.values.tolist() == now.values.tolist()
 
 
@@ -47,17 +47,17 @@ def test_an_option_that_there_is_not_is_named(call: object) -> None:
 
 
 def test_a_partial_result_is_warned_of_where_the_package_was_called() -> None:
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as reported:
         warnings.simplefilter("always")
         udd.errors.interrupted(lambda: None, "half is missing", partial=True)
-    assert told[0].filename == __file__
+    assert reported[0].filename == __file__
 
 
 def test_attributes_and_modules_of_before_work_with_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     model = udd.DLE(1.0)
-    with pytest.warns(DeprecationWarning, match="DLE.slow is called time_scale now") as told:
+    with pytest.warns(DeprecationWarning, match="DLE.slow is called time_scale now") as reported:
         before = model.slow
-    assert told[0].filename == __file__ and before == model.time_scale
+    assert reported[0].filename == __file__ and before == model.time_scale
     with pytest.warns(DeprecationWarning, match="called udd.related_systems now"):
         assert udd.relatives is udd.related_systems
     monkeypatch.delitem(sys.modules, "udd.relatives", raising=False)

@@ -122,8 +122,8 @@ def places(value: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         for key in value:
             yield from places(value[key], (*at, key))
     elif isinstance(value, list):
-        for k, one in enumerate(value):
-            yield from places(one, (*at, k))
+        for k, item in enumerate(value):
+            yield from places(item, (*at, k))
 
 
 def mutated(sample: Any, chance: random.Random) -> Any:

@@ -20,14 +20,14 @@ SECTION = re.compile(
 
 def named() -> dict[str, str]:
     """What the sections Raises and Warns of all docstrings name, and where it is named first."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for path in SOURCES:
         for section in SECTION.finditer(path.read_text(encoding="utf-8")):
             indent = section[1]
             for name in re.findall(rf"^{indent}([A-Z]\w+(?:, [A-Z]\w+)*)$", section[3], re.M):
-                for one in name.split(", "):
-                    found.setdefault(one, path.name)
-    return found
+                for item in name.split(", "):
+                    result.setdefault(item, path.name)
+    return result
 
 
 def test_the_sections_are_found():

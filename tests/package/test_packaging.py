@@ -13,13 +13,13 @@ VERSION = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["pack
 
 
 def names(requirements: list[str]) -> set[str]:
-    return {re.split(r"[\[<>=!~ ;]", one)[0].lower().replace("_", "-") for one in requirements}
+    return {re.split(r"[\[<>=!~ ;]", item)[0].lower().replace("_", "-") for item in requirements}
 
 
 def test_codemeta_says_what_the_project_says() -> None:
     said = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
     assert said["version"] == VERSION
-    assert {one.replace("_", "-") for one in said["softwareRequirements"]} == names(PROJECT["dependencies"])
+    assert {item.replace("_", "-") for item in said["softwareRequirements"]} == names(PROJECT["dependencies"])
     assert set(said["keywords"]) == set(PROJECT["keywords"])
 
 

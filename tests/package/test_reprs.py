@@ -16,18 +16,18 @@ from udd.report import write
 
 
 def test_every_result_is_one_line(tmp_path: Path) -> None:
-    found = discovered.disk()
+    actual = discovered.disk()
     report = write(discovered.pendulum(), tmp_path / "report.html")
     made = {
         **{name: result for name, result in results().items() if not hasattr(result, "data_vars")},
         "render": film(tmp_path),
         "report": report,
         "reproduction": udd.paper.reproduce(tmp_path / "paper", only=["scales"]),
-        "errors": found.error_before,
-        "noise": found.noise,
-        "budget": found.fit.budget(),
-        "fit": found.fit,
-        "discovery": found,
+        "errors": actual.error_before,
+        "noise": actual.noise,
+        "budget": actual.fit.budget(),
+        "fit": actual.fit,
+        "discovery": actual,
         "spec": udd.SweepSpec("lyapunov", udd.DLE(1.0), {"w": [1.0, 2.0]}),
         "effect": udd.effects.relaxation(b=6.0),
         "curve": udd.effects.curve("vertical", "Z", -0.05, 0.05, [0.001] * 12),

@@ -39,8 +39,8 @@ def test_a_fit_comes_back_to_the_bit(swing: tuple[udd.Measurement, udd.Fit], tmp
     for name in ("covariance", "states", "state_covariance", "misfit", "misfit_variance", "defect"):
         np.testing.assert_array_equal(getattr(again, name), getattr(fit, name))
     np.testing.assert_array_equal(again.residuals, fit.residuals)
-    one, other = (udd.forecast(measured, f, 2.0, members=20) for f in (fit, again))
-    np.testing.assert_array_equal(one.members, other.members)
+    item, other = (udd.forecast(measured, f, 2.0, members=20) for f in (fit, again))
+    np.testing.assert_array_equal(item.members, other.members)
     # What is shared stays shared, and what was read is not written to.
     assert again.problem.models[0] is not None and again.problem.record is again.record
     assert again.measurement.meta == {"source": "made"} and not again.measurement.t.flags.writeable
@@ -88,12 +88,12 @@ def same(one: udd.Discovery, other: udd.Discovery) -> None:
 
 @pytest.mark.parametrize("find", [discovered.nothing, discovered.pendulum, discovered.disk])
 def test_a_discovery_comes_back_with_its_report(find: Any, tmp_path: Path) -> None:
-    found = find()
-    again = back(found, tmp_path)
-    same(found, again)
-    assert (again.fit is again.baseline) == (found.fit is found.baseline)
+    actual = find()
+    again = back(actual, tmp_path)
+    same(actual, again)
+    assert (again.fit is again.baseline) == (actual.fit is actual.baseline)
     pages = []
-    for name, result in (("one", found), ("other", again)):
+    for name, result in (("one", actual), ("other", again)):
         result.report(tmp_path / f"{name}.html")
         pages.append((tmp_path / f"{name}.html").read_text())
     assert pages[0] == pages[1]
@@ -121,7 +121,7 @@ def test_what_is_no_result_is_refused(swing: tuple[udd.Measurement, udd.Fit], tm
             result.writestr(name, part.replace(b"}", b"(", 1) if name == "a0.npy" else part)
     other = tmp_path / "other.npz"
     wrongs = (foreign, pickled, open_bracket)
-    for wrong in (b"", b"no zip", content[:-1], content[1:], *(one.getvalue() for one in wrongs)):
+    for wrong in (b"", b"no zip", content[:-1], content[1:], *(item.getvalue() for item in wrongs)):
         other.write_bytes(wrong)
         with pytest.raises(udd.UddError, match=r"other\.npz is not a whole file of udd\.save$"):
             udd.load(other)

@@ -10,13 +10,13 @@ import udd
 
 
 def test_results_are_one_line() -> None:
-    found = discovered.disk()
+    actual = discovered.disk()
     many = udd.ensemble(udd.DLE(5.0), [0.0, 0.1], [[1, 1, 0], [2, 1, 0]])
-    for result in (found, found.fit, found.measurement, many, udd.simulate(udd.DLE(5.0), 1.0, [1, 1, 0])):
+    for result in (actual, actual.fit, actual.measurement, many, udd.simulate(udd.DLE(5.0), 1.0, [1, 1, 0])):
         assert len(repr(result)) < 400 and "\n" not in repr(result)
-    assert repr(found).startswith("<Discovery: effect identified: ")
-    assert found.effects[0].title in found._repr_html_()
-    errors = found.error_before
+    assert repr(actual).startswith("<Discovery: effect identified: ")
+    assert actual.effects[0].title in actual._repr_html_()
+    errors = actual.error_before
     assert repr(errors).startswith(f"<Errors of {len(errors.samples)} free runs: median ")
     assert f" {errors.unit} at {errors.horizons[0]:.3g} s" in repr(errors)
     assert len(repr(errors)) < 400 and "\n" not in repr(errors)

@@ -44,15 +44,15 @@ def test_every_claim_has_an_expected_verdict() -> None:
     assert set(VERDICTS) == set(CLAIMS)
 
 
-@pytest.mark.parametrize("key", [key for key, one in CLAIMS.items() if not one.filmed])
+@pytest.mark.parametrize("key", [key for key, item in CLAIMS.items() if not item.filmed])
 def test_claim(key: str, tmp_path: Path) -> None:
-    found = CLAIMS[key].check(Lab(tmp_path, nowhere))
-    assert found.verdict == VERDICTS[key], found.evidence
-    assert "nan" not in found.evidence
-    assert bool(found.remark) == (found.verdict != "holds")
+    result = CLAIMS[key].check(Lab(tmp_path, nowhere))
+    assert result.verdict == VERDICTS[key], result.evidence
+    assert "nan" not in result.evidence
+    assert bool(result.remark) == (result.verdict != "holds")
 
 
-@pytest.mark.parametrize("key", [key for key, one in FIGURES.items() if not one.filmed])
+@pytest.mark.parametrize("key", [key for key, entry in FIGURES.items() if not entry.filmed])
 def test_figure(key: str, tmp_path: Path) -> None:
     made = FIGURES[key].draw(Lab(tmp_path, nowhere))
     for ax in made.axes:
@@ -120,9 +120,9 @@ def test_the_command_writes_a_page_that_stands_alone(
 ) -> None:
     arguments = ["--out", str(tmp_path), "--only", "eigenvalues", "--only", "stable-below", "--json"]
     assert main(["paper", *arguments]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["claims"][0]["verdict"] == "does not hold"
-    page = Path(told["page"]).read_text()
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["claims"][0]["verdict"] == "does not hold"
+    page = Path(reported["page"]).read_text()
     assert "data:image/png;base64," in page
     assert "does not hold" in page
     assert not any(word in page for word in ("http://", "https://", "<script", 'src="/'))
@@ -136,10 +136,10 @@ def test_what_needs_films_is_listed_where_there_are_none(
         for key in [key for key in entries if key not in kept]:
             monkeypatch.delitem(entries, key)
     assert main(["paper", "--out", str(tmp_path), "--no-films", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["left_out"] == ["slow-polar", "falls-filmed"]
-    assert [one["key"] for one in told["figures"]] == ["geometry"]
-    text = Path(told["page"]).read_text()
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["left_out"] == ["slow-polar", "falls-filmed"]
+    assert [item["key"] for item in reported["figures"]] == ["geometry"]
+    text = Path(reported["page"]).read_text()
     assert "Small drive: polar coordinates (Figure 7)" in text
     assert "data:image/svg+xml;base64," in text
 
@@ -153,16 +153,16 @@ def test_falls_of_a_made_up_motion() -> None:
     t = np.linspace(0, 40, 40001)
     # Hanging, up on the right, down on the left; then up on the left and down there: one whole turn back.
     theta = np.interp(t, [0, 5, 10, 20, 30, 40], np.pi * np.array([1, 1, 0, -1, -0.05, -1.0]))
-    found = falls(t, np.sin(theta), np.cos(theta))
-    assert found.rose.tolist() == [1, -1]
-    assert found.side.tolist() == [-1, -1]
-    assert found.turns.tolist() == [-1, 0]
-    assert found.lengths.tolist() == [2]
+    result = falls(t, np.sin(theta), np.cos(theta))
+    assert result.rose.tolist() == [1, -1]
+    assert result.side.tolist() == [-1, -1]
+    assert result.turns.tolist() == [-1, 0]
+    assert result.lengths.tolist() == [2]
     # Resting to 5 s, then 0.3 rad at each speed about hanging: 0.3/(pi/5) + 2 of 0.3/(0.1 pi), 0.3/(0.095 pi)
     # beside the turning points.
-    near = 5 + 0.3 / (np.pi / 5) + 0.3 / (np.pi / 10) + 2 * 0.3 / (0.095 * np.pi)
-    assert found.plateau == pytest.approx(near / 40, abs=1e-3)
-    assert found.rising == pytest.approx((5 + 10) / 40, abs=1e-3)
+    close = 5 + 0.3 / (np.pi / 5) + 0.3 / (np.pi / 10) + 2 * 0.3 / (0.095 * np.pi)
+    assert result.plateau == pytest.approx(close / 40, abs=1e-3)
+    assert result.rising == pytest.approx((5 + 10) / 40, abs=1e-3)
 
 
 def test_the_offsets_growth_is_the_integral_of_its_rate() -> None:

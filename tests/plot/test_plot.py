@@ -134,8 +134,8 @@ def test_a_torque_that_does_not_brake_is_no_friction() -> None:
 
 
 def test_the_residual_of_a_right_model_has_no_pattern() -> None:
-    found = discovered.disk()
-    z = found.baseline.states[:-1, 2], found.baseline.defect[:, 2]
+    result = discovered.disk()
+    z = result.baseline.states[:-1, 2], result.baseline.defect[:, 2]
     assert pattern(*z) > 0.3  # the hidden effect: dZ/dT misses -b W Z
     null = discovered.nothing().baseline
     x, y = null.states[:-1, 2], null.defect[:, 2]
@@ -145,27 +145,27 @@ def test_the_residual_of_a_right_model_has_no_pattern() -> None:
 
 
 def test_evidence_stands_beside_what_chance_reaches() -> None:
-    found = discovered.disk()
-    ax = udd.plot.evidence(found)
+    result = discovered.disk()
+    ax = udd.plot.evidence(result)
     titles = [tick.get_text().replace("\n", " ") for tick in ax.get_yticklabels()]
-    assert found.effects[0].title in titles
+    assert result.effects[0].title in titles
     (line,) = [x for x in ax.lines if x.get_linestyle() == "--"]
     limit = line.get_xdata()[0]
     # One amplitude, chance 1e-3 over some 20 to 1000 candidates: chi2 between 16 and 24.
     assert 15 < limit < 26
     widths = [bar.get_width() for bar in ax.patches]
     assert widths == sorted(widths, reverse=True)
-    assert widths[titles.index(found.effects[0].title)] > limit
+    assert widths[titles.index(result.effects[0].title)] > limit
     calm = udd.plot.evidence(discovered.nothing())
     assert max(bar.get_width() for bar in calm.patches) < limit
 
 
 def test_errors_show_intervals_and_the_floor() -> None:
-    found = discovered.disk()
-    ax = udd.plot.errors(found)
+    result = discovered.disk()
+    ax = udd.plot.errors(result)
     words = [text.get_text() for text in ax.get_legend().get_texts()]
     assert words == ["the known model", "with the added effect", "noise floor"]
-    np.testing.assert_allclose(ax.lines[0].get_ydata(), 1e3 * found.error_before.median)
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), 1e3 * result.error_before.median)
     assert ax.get_xscale() == ax.get_yscale() == "log"
 
 

@@ -94,11 +94,11 @@ class Served:
 def served(log: Path, files: int = 1024) -> Iterator[Served]:
     if sys.platform == "win32":
         pytest.skip("needs limits of open files")
-    one = Served(log, files)
+    item = Served(log, files)
     try:
-        yield one
+        yield item
     finally:
-        one.process.kill()
-        one.process.wait(10)
-        assert one.process.stdout is not None
-        one.process.stdout.close()
+        item.process.kill()
+        item.process.wait(10)
+        assert item.process.stdout is not None
+        item.process.stdout.close()

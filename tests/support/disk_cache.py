@@ -72,7 +72,7 @@ def cached_on_disk(compute: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(compute)
     def read(*args: P.args, **kwargs: P.kwargs) -> R:
-        options = [one for item in sorted(kwargs.items()) for one in item]
+        options = [entry for item in sorted(kwargs.items()) for entry in item]
         name = f"{compute.__name__}-{key(compute.__module__, compute.__qualname__, *args, *options)}"
         path = folder() / f"{name}.pickle"
         if not path.is_file():

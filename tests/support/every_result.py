@@ -29,20 +29,20 @@ def branch() -> udd.Branch:
 def results() -> dict[str, Any]:
     """A result of every kind, by the name of its class; small ones, made by the package's own functions."""
     dle = udd.DLE(5.0)
-    own = udd.Model(["q", "v"], ["v", "-q - 0.1*v"])
+    each = udd.Model(["q", "v"], ["v", "-q - 0.1*v"])
     t = np.arange(0.0, 3.0, 0.05)
     tank = udd.Model(["h"], ["u - k*h"], {"k": 1.0}, inputs=["u"])
     level = udd.simulate(tank, t, [0.0], inputs={"u": np.sin(t) + 1}).state
     noisy = level + 1e-3 * np.random.default_rng(0).normal(size=level.shape)
     driven = udd.Measurement(t, {"h": noisy[:, 0]}, inputs={"u": np.sin(t) + 1})
-    found = discovered.disk()
+    result = discovered.disk()
     return {
         "Trajectory": disk_run(),
-        "Trajectory of an own model": udd.simulate(own, t, [1.0, 0.0]),
+        "Trajectory of an own model": udd.simulate(each, t, [1.0, 0.0]),
         "Trajectory of six states": udd.simulate(six(), t, [0.1] * 6),
-        "Measurement": found.measurement,
+        "Measurement": result.measurement,
         "Measurement of an own model": driven,
-        "Fit": found.fit,
+        "Fit": result.fit,
         "Fit of an own model": udd.fit(driven, tank),
         "Ensemble": udd.ensemble(dle, t, [[1, 1, 0], [2, 1, 0]]),
         "EnergyBalance": udd.energy_balance(disk_run()),
@@ -50,7 +50,7 @@ def results() -> dict[str, Any]:
         "Section of two surfaces": udd.poincare(dle, ["z", "omega"], n=50),
         "Spectrum": udd.lyapunov_spectrum(udd.DLE(9.0), t=500.0, tol=0.1),
         "Covariant": udd.covariant_vectors(dle, 40),
-        "Forecast": udd.forecast(found.measurement, found.fit, start=30.0, members=16),
+        "Forecast": udd.forecast(result.measurement, result.fit, start=30.0, members=16),
         "Equilibrium": udd.equilibria(udd.DLE(8.0))[0],
         "PeriodicOrbit": cycle(),
         "Branch": branch(),

@@ -279,7 +279,7 @@ def drawn(count: int, seed: int) -> Iterator[Case]:
         values = {name: float(random.uniform(*range_)) for name, range_ in law.parameters}
         if k >= len(LAWS):
             # Rates of angles stay rates: only states that are no angle's rate have units of their own.
-            rates = [law.equations[i] for i, one in enumerate(plain) if not one]
+            rates = [law.equations[i] for i, item in enumerate(plain) if not item]
             for i, name in enumerate(law.states):
                 if name in rates:
                     size[i], origin[i] = 1.0, 0.0

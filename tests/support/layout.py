@@ -24,7 +24,7 @@ def overlaps(figure: Figure) -> list[tuple[str, str]]:
     """Pairs of texts that cover a part of each other, and texts that are cut off by the figure's edge."""
     figure.canvas.draw()
     shown = [(text.get_text(), corners(text)) for text in texts(figure)]
-    pairs = [(a, b) for (a, one), (b, other) in combinations(shown, 2) if meet(one, other)]
+    pairs = [(a, b) for (a, item), (b, other) in combinations(shown, 2) if meet(item, other)]
     width, height = figure.bbox.width, figure.bbox.height
     cut = [
         (name, "the edge")
@@ -45,9 +45,9 @@ def texts(figure: Figure) -> list[Text]:
             hidden |= {id(label) for tick in ticks for label in (tick.label1, tick.label2)} - kept
             if not ax.axison:
                 hidden |= {id(axis.label), id(axis.offsetText)}
-    found = figure.findobj(lambda artist: isinstance(artist, Text))
+    result = figure.findobj(lambda artist: isinstance(artist, Text))
     return [
-        text for text in found if text.get_visible() and text.get_text().strip() and id(text) not in hidden
+        text for text in result if text.get_visible() and text.get_text().strip() and id(text) not in hidden
     ]
 
 
