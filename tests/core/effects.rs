@@ -1,4 +1,4 @@
-//! What holds for every effect of the library, the ones still to be written included.
+//! Properties of every effect of the library, including future ones.
 
 use std::array::from_fn;
 
@@ -173,7 +173,7 @@ proptest! {
             term.enter(&N::fixed, &at, &mut slots);
 
             let moment = (at.g * y - (k + slots.friction) * omega + slots.torque).re;
-            // What the flow says of the contact's velocity.
+            // The contact's velocity from the flow.
             let scale = moment.abs() + (inertia.re * flow[0]).abs() + 1e-3;
             prop_assert!((flow[1] - (x[2] * x[0] + slots.lateral.re)).abs() < 1e-13);
             prop_assert!((flow[2] - (-x[1] * x[0] + w + slots.vertical.re)).abs() < 1e-13);

@@ -85,7 +85,7 @@ fn point(states: Vec<[f64; 4]>, model: Vec<f64>) -> Unknowns<4> {
     }
 }
 
-/// What is off at a point: of the frames, and of the links.
+/// Residuals at a point: misfits of the frames, and defects of the links.
 fn residuals(estimator: &Problem, point: &Unknowns<4>) -> (Vec<SVector<f64, 3>>, Vec<SVector<f64, 4>>) {
     let linear = estimator.linearise(point).unwrap();
     (linear.misfits(), linear.defects())
@@ -208,7 +208,7 @@ proptest! {
     }
 }
 
-/// What the camera leaves out of a delay is of the third order in time, and of an exposure's mean of the fourth.
+/// The camera's error in a delay is of third order in time, that in an exposure's mean of fourth.
 #[test]
 fn a_camera_follows_paths_to_the_second_order() {
     let disk = family(&[]).build(&PAPER);
@@ -311,7 +311,7 @@ fn the_score_foretells_the_fit() {
     assert!((drop - gained).abs() < 0.1 * gained.max(1.0), "{drop} {gained}");
 }
 
-/// What a solve leaves is taken where the next one starts, and only there.
+/// The next solve reuses a linearisation at its start, and only there.
 #[test]
 fn a_known_linearisation_is_not_made_again() {
     let (record, states) = film(&family(&[]), &PAPER, 100, 6);
@@ -376,8 +376,8 @@ fn filled_up<const D: usize>(
     (estimator, Unknowns { states, sets: vec![FilmParameters { model, camera: Vec::new(), clock: 0.0 }] })
 }
 
-/// What idle states must not change: cost, evidence, parameters and their covariance, the states with theirs, what is
-/// foretold, innovations, and the score of a further term.
+/// Results that padding states must not change: cost, evidence, parameters and states with covariances, predictions,
+/// innovations, and the score of a further term.
 fn estimate<const D: usize>(film: &[[f64; 3]]) -> Vec<f64> {
     let equations = ["p0*(x1 - p3*x0)", "x0*(p1 - p4*x2) - p5*x1 + p6", "x0*x1 - p2*x2"];
     let family = FormulaFamily::<3>::parse(&names("x", 3), &equations, &names("p", 7), &[]).unwrap();

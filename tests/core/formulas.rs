@@ -228,7 +228,7 @@ fn what_is_no_effect_is_refused() {
         assert!(found.contains(wanted), "{text}: {found}");
     }
     assert!(mistake(Slot::Vertical, "c*theta", &["c"], &["c"]).contains("mixes"));
-    // What is linear in all of its amplitudes together is one.
+    // A formula that is jointly linear in its amplitudes is an effect.
     assert!(formula(Slot::Torque, "-(a*Z - Y*b/(1 + n^2))*2", &["a", "b", "n"], &["a", "b"]).is_ok());
     assert!(formula(Slot::Torque, "sin(t)*Z", &[], &[]).is_ok());
 }

@@ -26,7 +26,7 @@ fn starts<const D: usize>(n: usize, centre: [f64; D]) -> Vec<[f64; D]> {
     (0..n).map(|i| std::array::from_fn(|d| part(i, d))).collect()
 }
 
-/// A chain of so many Duffing oscillators, idle states behind it up to `D`.
+/// A chain of Duffing oscillators, padded with unused states up to `D`.
 fn chain<const D: usize>(oscillators: usize) -> FormulaFamily<D> {
     let name = |letter: &str| (0..oscillators).map(|i| format!("{letter}{i}")).collect::<Vec<_>>();
     let (x, v) = (name("x"), name("v"));
@@ -95,7 +95,7 @@ fn smooth_laws() {
     }
 }
 
-/// More states than the usual, some of them idle.
+/// More states than usual, some of them padding.
 #[test]
 fn chains_of_oscillators() {
     for rtol in [1e-6, 1e-9] {

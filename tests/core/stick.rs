@@ -486,7 +486,7 @@ fn chattering_is_an_outcome() {
     assert_eq!(run.outcome, Outcome::Chattering);
     // It falls for sqrt 2, then flies for 2 sqrt 2 (0.9 + 0.9^2 + ...) = 18 sqrt 2.
     let end = run.t[run.t.len() - 1];
-    // What it still flies when its height is lost in a step's 1e-12: about 1e-3.
+    // Its remaining flight once its height is below a step's 1e-12: about 1e-3.
     assert!((end - 19.0 * 2f64.sqrt()).abs() < 1e-3, "{end}");
     assert_eq!(run.t[..3], [0.0, 1.0, 10.0]);
     assert_eq!((run.t.len(), run.x.len()), (4, 4));

@@ -313,7 +313,7 @@ fn tangents() {
     }
 }
 
-/// What is run once for each instruction set.
+/// Test that runs once for each instruction set.
 struct Bits<'a, F, const D: usize> {
     family: &'a F,
     tape: &'a Tape<D>,
@@ -438,8 +438,8 @@ fn a_disks_written_series_has_the_same_bits() {
     }
 }
 
-/// What is left out where it vanishes changes no bit, nor does it change which series is written out: a run's bits do
-/// not depend on the runs beside it.
+/// Terms that are skipped where they vanish change no bit, and do not change which series is written out: a run's bits
+/// do not depend on the other runs of its packet.
 #[test]
 fn what_vanishes_changes_no_bit() {
     const N: usize = HIGH + 1;

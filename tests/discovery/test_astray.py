@@ -1,4 +1,4 @@
-"""What is found where the known model alone goes far astray, or its parameters are not determined."""
+"""Searches in which the known model alone diverges, or its parameters are not determined."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_what_leads_is_located_before_the_library_is_fitted() -> None:
 
 
 def test_what_dies_down_slowly_is_scored_where_it_is_held_tightly() -> None:
-    """A cubic drag on a pendulum, which shows over minutes: a model held loosely hardly tells it."""
+    """A cubic drag on a pendulum, which shows over minutes: with a large model error it is hardly visible."""
     truth = udd.Pendulum(0.65, k0=0.002, effects=[udd.effects.cubic_drag(c=0.003)])
     t = np.arange(0.0, 120.0, 0.05)
     theta = udd.simulate(truth, t, [0.0, 0.8]).state[:, 1]
@@ -246,7 +246,7 @@ def test_where_misfits_show_the_models_faults_no_noise_is_sought_at_tighter_leve
 
 
 def test_once_a_strong_effect_is_found_the_noise_is_estimated_anew(astray: Fit) -> None:
-    """Around the known model it could not be told from what the model misses, and was taken as stated."""
+    """Around the known model it is hidden by the remaining misfit, and stays at its given value."""
     result = extend(astray, [udd.effects.load_drive(a=1.8)], [1.8])
     free = fit_record(
         astray.measurements, astray.record, astray.models, ["k0", "W"], camera=False, search=True

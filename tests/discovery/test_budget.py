@@ -103,7 +103,7 @@ def test_a_motion_that_dies_down_below_its_noise_is_averaged():
     # As the pull of a brake that bends the motion within a few frames is at its start.
     fast = udd.Measurement(t, {"theta": 2.0 * np.exp(-t / 4) * np.cos(150 * t) + noise})
     assert thinned(fast).every == 1
-    # What never goes beyond its noise has no time scale.
+    # A motion below its noise has no time scale.
     assert thinned(udd.Measurement(t, {"theta": noise})).every >= 3
 
 

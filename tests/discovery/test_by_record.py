@@ -67,7 +67,7 @@ def test_what_only_one_record_wants_is_told_apart() -> None:
     nearest = result.rejected[0]
     assert nearest.title == "abs(v)*v in v'" and nearest.why == "records"
     assert [a.answer for a in nearest.by_record] == ["does not want it", "wants it", "does not want it"]
-    assert result.remarks[0] == "abs(v)*v in v': only record 1 wants it."
+    assert result.remarks[0] == "abs(v)*v in v': significant only in record 1."
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What held-out data do not bear out is no finding, and a model that loses the motion is not complete."""
+"""Effects must be confirmed by held-out data, and a model that loses the motion is incomplete."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_free_runs_that_lose_the_motion_are_never_complete(monkeypatch):
     assert not misses_the_motion(result.error_before, record, fixed)
     lost = replace(result.error_before, run=np.full(fixed.sum(), 1.5))
     assert misses_the_motion(lost, record, fixed)
-    noisy = replace(lost, floor=np.full(len(lost.floor), 1.0))  # nothing can be told there
+    noisy = replace(lost, floor=np.full(len(lost.floor), 1.0))  # no conclusion is possible there
     assert not misses_the_motion(noisy, record, fixed)
     disk = discovered.nothing()
     assert not misses_the_motion(disk.error_before, disk.fit.record, ~disk.fit.record.first(0.6))

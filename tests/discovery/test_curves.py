@@ -27,7 +27,7 @@ from udd.plot.curves import curve as draw
 
 E = udd.effects
 W = 0.045
-#: Of the laws of `unmodelled`, which show clearly at full size: evidences of 100 to 1000 nats remain.
+#: Laws of `unmodelled` that show clearly at full size: evidences of 100 to 1000 nats remain.
 SHARE = 0.25
 
 
@@ -68,7 +68,7 @@ def test_friction_by_the_load_is_located_over_the_load(seed):
     best, second = scan_curves(base).curves[:2]
     assert best.name == ("friction", "load")
     assert best.evidence > second.evidence + 20
-    # The record starts anywhere; that friction at rest is a part of k0, only its rise is told.
+    # The record starts anywhere; friction at rest is a part of k0, so only its increase is identifiable.
     low, high = best.values(np.array([-0.05, 0.25]))
     rise = 0.5 * np.subtract(*unmodelled.squeeze(np.array([0.25, -0.05])))
     assert high - low == pytest.approx(rise, rel=0.3)
@@ -301,7 +301,7 @@ def test_bands_of_a_plain_regression_hold_the_curve():
 
 
 def test_a_straight_line_is_charged_as_two_parameters():
-    """Where nothing is bent the evidence is that of the Bayesian information criterion, about."""
+    """Without curvature the evidence is approximately that of the Bayesian information criterion."""
     for size in (0.1, 30.0):
         spline, _x, score = _regression(1, lambda x, size=size: size * x)
         result = smooth(score, spline.roughness, 400)
@@ -522,7 +522,7 @@ def test_a_surface_is_added_and_refitted():
     )
     located = fit_curve(base, result.curves[0], "surface")
     assert located.fit.converged
-    # Not by chi2: the plain model has to be held more loosely, where any model fits.
+    # chi2 is no criterion: the plain model needs a larger model error, with which any model fits.
     assert located.fit.evidence > base.evidence + 200
     # Where the record has been the surface is the law, but for what a torque over Y or over Z alone could do
     # as well (friction, a pivot that is off): the mixed second difference is left.

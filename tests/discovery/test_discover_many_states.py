@@ -1,4 +1,4 @@
-"""What a chain of four oscillators lacks, which has eight states, is named."""
+"""Missing terms of a chain of four oscillators, which has eight states."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_a_cubic_spring_of_one_oscillator_of_four_is_named() -> None:
 
 
 def test_the_library_stays_bounded() -> None:
-    """Of twelve states squares and cubes, but no products of three; of angles no products with the states."""
+    """Twelve states get squares and cubes, no products of three; angles get no products with states."""
     listed = [c.title for c in terms(chain(6))]
     # In each of six equations: a constant, 12 states, their 78 products, 12 cubes and 12 times their sizes.
     assert len(listed) == 6 * (1 + 12 + 78 + 12 + 12)

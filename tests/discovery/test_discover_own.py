@@ -1,4 +1,4 @@
-"""What the user's own models lack: found as on the disk, by the same search."""
+"""Missing terms of users' own models: the same search as on the disk."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_what_a_driven_pendulum_lacks_is_found_from_its_angle_alone(
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.nightly)])  # 0 asks the same as 1
 def test_what_a_later_effect_makes_needless_is_left_out_together(seed: int) -> None:
-    # At first two other terms together do the missing one's work; beside it neither is needed.
+    # At first two other terms together imitate the missing one; with it neither is needed.
     baseline = udd.Model(["x", "y"], ["1 - a*x + b*x^2*y", "k*x"], {"a": 3.6, "b": 3.4, "k": 3.3})
     truth = baseline.replace(a=4.03, b=3.1, k=3.03).with_term("y", "x^2*y", loss=-3.1)
     t = np.linspace(0, 10, 512)
@@ -366,7 +366,7 @@ def logistic(t: np.ndarray) -> np.ndarray:
 def test_a_known_model_whose_free_runs_blow_up_is_found_to_lack_its_growth(tmp_path: Path) -> None:
     t = np.linspace(0, 10, 512)
     x = logistic(t) + 0.3 * np.random.default_rng(0).standard_normal(len(t))
-    # Of x' = k x^2 with k > 0, which the growth at first asks for, a run from 75 ends within the record.
+    # With x' = k x^2 and k > 0, as the growth at first suggests, a run from 75 diverges within the record.
     result = udd.discover(udd.Measurement(t, {"x": x}), udd.Model(["x"], ["k*x^2"], {"k": 0.001}))
     assert result.verdict == "effect identified"
     assert [f.title for f in result.effects] == ["x in x'"]

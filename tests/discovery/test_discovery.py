@@ -106,7 +106,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed):
     assert result.effects == []
     assert result.alternatives == []
     assert result.ratio == (1.0, 1.0, 1.0)
-    # What is said of the known model is what its best fit says.
+    # The known model is described by its best fit.
     assert result.baseline.parameters == result.fit.parameters
     assert result.baseline.errors == result.fit.errors
 
@@ -215,9 +215,9 @@ def test_ripples_from_one_response_equal_those_scored_singly():
     few = slice(20, len(together), 90)
     singly = scan(fitted, listed[few]).scored
     for a, b in zip(together[few], singly, strict=True):
-        # Within a frame, waves are combined from three frequencies, good to 1e-5; where the friction switches
-        # within it they are followed at three places, which is good to a hundredth of the error: of the
-        # amplitudes, and of the root of chi2, which counts them in their errors.
+        # Within a frame, waves are combined from three frequencies, accurate to 1e-5. If the friction
+        # switches within the frame they are followed at three places, accurate to 1 % of the error. The error
+        # is that of the amplitudes, and of the root of chi2, in units of which they count.
         np.testing.assert_allclose(a.amplitudes, b.amplitudes, rtol=2e-3, atol=2e-2 * max(b.errors))
         assert a.chi2**0.5 == pytest.approx(b.chi2**0.5, rel=2.5e-3, abs=1e-2)
 
@@ -289,7 +289,7 @@ def test_a_short_record_is_refused():
 
 def test_a_record_too_short_for_a_forecast_is_refused():
     measured, _states = simulated.film(udd.Disk(0.04), np.random.default_rng(1), 3.0)
-    with pytest.raises(FitError, match=r"too short for a forecast|hold no"):
+    with pytest.raises(FitError, match=r"too short for a forecast|have no"):
         udd.discover(measured, udd.Disk(0.04))
 
 
@@ -308,14 +308,14 @@ def test_real_string_pendulums_lose_energy_to_the_air(shared, name, length, most
     assert result.ratio[2] < 1.0
     assert result.ratio[0] < most
     drag = result.effects[0].parameters["c"] / result.model.parameters["inertia"] / length
-    if name == "b":  # whose pivot is off by a tenth of its length: 1.56 mrad where that is held as stated
+    if name == "b":  # the pivot is off by a tenth of its length: 1.56 mrad if it is fixed at its given value
         assert result.error_after.whole < 1.4e-3
     assert 0.013 < drag < 0.022  # one aerodynamic constant for all lengths, 0.014 to 0.021 there
 
 
 @pytest.mark.nightly
 def test_a_formula_that_free_runs_contradict_ends_the_search(shared):
-    """A pendulum of a cup: its formula of Omega fits and foretells worse; nothing around it is better."""
+    """A pendulum of a cup: its formula of Omega fits and predicts worse; nothing around it is better."""
     measured = udd.read_measurement(shared / "data/real/cup_pendulum.txt", columns="t,theta,_")
     said: list[str] = []
     result = udd.discover(measured, udd.Pendulum(0.65, k0=0.01 * 0.65**2), progress=said.append)

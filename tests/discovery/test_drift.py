@@ -1,4 +1,4 @@
-"""What a sensor's drift looks like, fits that come near their minimum, and curves that lead."""
+"""Drifts of a sensor, fits that come close to their minimum, and curves that lead."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KNOWN = udd.Pendulum(0.8, k0=0.013)
 
 
 def drifting(size: float) -> udd.Measurement:
-    """A pendulum whose sensor's zero wanders by so much."""
+    """A pendulum whose sensor's zero drifts, with this amplitude."""
     rng = np.random.default_rng(5)
     t = np.arange(0, 50, 0.04)
     theta = udd.simulate(udd.Pendulum(0.82, k0=0.012), t, [0.0, 0.8]).state[:, 1]
@@ -70,7 +70,7 @@ def test_a_search_takes_a_fit_that_is_near_its_minimum():
     done = fit_record(measured, record_of(measured), KNOWN, search=True)
     unfinished = replace(done, converged=False)
     assert model_error_schedule._nearly(unfinished, model_error_schedule.STEPS).converged
-    # Of a fit that is asked for itself nothing less than the minimum will do.
+    # A fit of its own must reach its minimum.
     alone = replace(unfinished, problem=replace(done.problem, likeliest=True))
     assert model_error_schedule._nearly(alone, model_error_schedule.STEPS) is alone
     # Nor of a formula, whose constants may trade for each other for ever.

@@ -1,4 +1,4 @@
-"""What a machine with a measured input lacks, where that input's sensor has noise."""
+"""Missing terms of a machine with a measured input whose sensor has noise."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_drag_is_named_beside_the_noise_of_the_torque(seed: int) -> None:
     (added,) = result.effects
     assert result.verdict == "effect identified"
     assert added.effect.name == "abs_v_v_in_v"
-    # Within 5 %: noise of the torque, a part in 200, and the arm's constants are free beside it.
+    # Within 5 %: noise of the torque is 0.5 %, and the arm's constants are free too.
     (value,) = added.effect.parameters.values()
     assert abs(value / -0.25 - 1.0) < 0.05
     assert result.ratio[2] < 0.2

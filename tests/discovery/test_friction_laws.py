@@ -19,7 +19,7 @@ E = udd.effects
 
 
 def seen(truth: Any, duration: float = 60.0, start: float = 1.0, noise: float = 5e-3) -> udd.Measurement:
-    """A pendulum's angle 30 times a second, with so much noise."""
+    """A pendulum's angle 30 times a second, with noise of this size."""
     t = np.arange(0, duration, 1 / 30)
     theta = udd.simulate(truth, t, [0.0, start]).state[:, 1]
     return udd.Measurement(t, {"theta": theta + noise * np.random.default_rng(0).standard_normal(len(t))})

@@ -1,4 +1,4 @@
-"""A camera that was held as perfect, and shows all the same; and forms told apart by a film's own scatter."""
+"""A camera that was assumed to be perfect and is not; forms distinguished by a film's own scatter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to film next: proposed where forms are in doubt, and right about what it tells."""
+"""Experiment design: a film is proposed if forms are in doubt, and its expected evidence is right."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def node(text: str) -> Any:
 
 @dataclass
 class Trial:
-    """What :mod:`udd.discovery.hypotheses` asks of a trial."""
+    """The attributes of a trial that :mod:`udd.discovery.hypotheses` reads."""
 
     candidates: list[Candidate]
     names: list[str]
@@ -192,7 +192,7 @@ def test_log_evidence_of_a_fit_with_a_drag_is_near_the_information_criterion():
     without, item, two = refit(plain), refit(right), refit(idle)
     assert log_evidence(item, names) > log_evidence(without, []) + 50
     lost = log_evidence(item, names) - log_evidence(two, [*names, "constant_torque.c"])
-    # What a number that is not needed costs: half the logarithm of the record's numbers, less a chi2 of 1.
+    # Cost of a needless number: half the logarithm of the record's numbers, less a chi2 of 1.
     assert math.log(len(t)) / 2 - 3.5 < lost < math.log(len(t)) / 2 + 1.0
 
 
@@ -278,7 +278,7 @@ def test_the_verdict_is_the_least_sure_that_holds(effects, unconfirmed, doubts, 
 
 
 def test_unit_information_has_a_covariance():
-    """Amplitudes that trade for each other determine nothing: such a hypothesis is never the likeliest."""
+    """Collinear amplitudes are not determined: such a hypothesis is never the most probable."""
     fit: Any = SimpleNamespace(
         evidence=5.0,
         parameters={"a": 1.0, "b": 1.0},

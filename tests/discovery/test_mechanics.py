@@ -1,4 +1,4 @@
-"""What mechanical models of the user's own may lack: dry friction first, and no drive at their own modes."""
+"""Missing terms of users' mechanical models: dry friction first, and no drive at their own modes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_forces_come_before_products_of_states():
     usual = {c.title: c.usual for c in library(SPRING)}
     assert all(usual[f"{text} in v'"] for text in ("1", "x", "v", "abs(v)*v", "v^3", "x^3"))
     assert not any(usual[f"{text} in v'"] for text in ("x*v", "v^2", "x^2", "x*v^2"))
-    # Of what is no mechanics nothing is known beforehand.
+    # Models other than mechanical ones have no prior on their terms.
     lorenz = udd.Model(list("xyz"), {"x": "y - x", "y": "-x*z", "z": "x*y"})
     assert all(c.usual for c in library(lorenz))
 

@@ -17,7 +17,7 @@ LAW = udd.Model(
 
 
 def tanks(leak: float, seed: int) -> udd.Measurement:
-    """Ten minutes, the pump set anew every 10 s; by SciPy, from 2.5 and 1.5."""
+    """Ten minutes, the pump changed every 10 s; by SciPy, from 2.5 and 1.5."""
     rng = np.random.default_rng(seed)
     t = np.arange(600.0)
     pump = np.repeat(rng.uniform(0.5, 3.5, 60), 10)

@@ -1,4 +1,4 @@
-"""What a machine with a measured input may lack beside forces that are products: a delay, a dead zone."""
+"""Missing terms of a machine with a measured input that are not products: a delay, a dead zone."""
 
 from __future__ import annotations
 

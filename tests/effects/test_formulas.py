@@ -89,7 +89,7 @@ def test_a_run_with_a_formula_is_that_with_the_librarys_effect() -> None:
 
 
 def torque_of(effect: Effect, states: np.ndarray) -> np.ndarray:
-    """What an effect adds to the torque."""
+    """Compute an effect's contribution to the torque."""
     disk = udd.Disk(0.039)
     change = disk.with_effects([effect]).rates(0.0, states) - disk.rates(0.0, states)
     return change[:, 0] * (0.08**2 / 2 + states[:, 1] ** 2 + states[:, 2] ** 2)

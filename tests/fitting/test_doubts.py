@@ -1,4 +1,4 @@
-"""What a fit says of its own faults: which films lack something, and which numbers ran off."""
+"""Diagnostics of a fit: which films lack something, and which parameters ran away."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ def test_a_right_model_is_not_doubted(seed):
 @pytest.mark.parametrize("W", [0.03, 0.042, 0.05])
 @pytest.mark.parametrize("part", [0.2, 1.0, 5.0])
 def test_a_plain_disk_lacks_nothing_however_well_it_is_seen(W, part):
-    """Of 0.1 mm and 1 mrad: where a loose model's states follow the frames the noise comes out too small."""
+    """Noise of 0.1 mm and 1 mrad: while a loose model follows the frames, its estimate is too small."""
     noise = part * np.array([1e-4, 1e-4, 1e-3])
     run = udd.simulate(udd.Disk(W), np.arange(0, 20, 0.04), [2, 0.02, -0.02, 0])
     seen = run.state[:, 1:4] + noise * np.random.default_rng(0).standard_normal((len(run.t), 3))
     result = udd.fit(udd.Measurement(run.t, seen), udd.Disk(W))
     assert not result.doubts.missing
-    # Of 500 frames the scatter is known to 3 %; three of it, and what the states follow.
+    # With 500 frames the scatter is accurate to 3 %; allow three times that, and the states' leverage.
     assert [item.noise for item in result.doubts.sensor] == pytest.approx(noise, rel=0.12)
 
 
@@ -159,7 +159,7 @@ def test_a_film_whose_disk_has_come_to_rest_repeats_its_picture():
 @pytest.mark.parametrize("digits", [None, 6, 4])
 @pytest.mark.parametrize("sensors", [1, 2])
 def test_the_last_digits_of_exact_data_are_no_missing_effect(digits, sensors):
-    """What is left is coloured, by the integrator or by rounding; a search finds nothing in it either."""
+    """Residuals are coloured by the integrator or by rounding; a search finds no effect in them either."""
     t = np.arange(0, 20, 0.05)
     baseline = udd.Model(["x", "v"], ["v", "-k*x - c*v"], {"k": 9.0, "c": 0.1})
     states = udd.simulate(baseline, t, [1.0, 0.0]).state

@@ -56,7 +56,7 @@ def test_leaps_over_levels_end_where_single_steps_do(hidden, monkeypatch):
     leapt = udd.fit(measured, start)
     monkeypatch.setattr(model_error_schedule, "_skip_levels", lambda *_: None)
     stepped = udd.fit(measured, start)
-    # A right model is held as tightly as it can be; one that is wrong only as tightly as is likely.
+    # A right model gets a small model error; a wrong one only the most probable one.
     right = leapt.problem.right
     assert leapt.level > right if not hidden else 0 < leapt.level < right
     assert stepped.level == leapt.level

@@ -33,7 +33,7 @@ def test_errors_are_as_large_as_they_say(n: int) -> None:
         pulls.append(
             [(result.parameters[k] - true) / result.errors[k] for k, true in (("F", 8.0), ("a", 1.0))]
         )
-    # Of 40 normal numbers the mean square is 1 +- 0.22, and none is above 4.5 but in one of 3000 draws.
+    # The mean square of 40 normal numbers is 1 +- 0.22; one exceeds 4.5 in one of 3000 draws.
     assert 0.5 < np.square(pulls).mean() < 2.0
     assert np.abs(pulls).max() < 4.5
 
@@ -54,9 +54,9 @@ def test_filled_up_numbers_of_states_are_fitted_and_foretold(n: int) -> None:
     pulls = np.array(
         [(result.parameters[name] - value) / result.errors[name] for name, value in true.items()]
     )
-    # Of n + 1 normal numbers; none is above 4.5 but in one of 10^4 draws.
+    # With n + 1 normal numbers one exceeds 4.5 in one of 10^4 draws.
     assert np.abs(pulls).max() < 4.5 and np.square(pulls).mean() < 3.0
     assert result.residuals.shape == (3 * len(t), n)
     ahead = udd.forecast(seen[0], result, np.arange(0.0, 0.81, 0.02), start=2.0, window=0.5, members=20)
-    # What is foretold is measured with a noise of 0.02; none of 400 normal numbers is above 5.
+    # Predictions are measured with a noise of 0.02; none of 400 normal numbers is above 5.
     assert np.abs(ahead.median - seen[0].values[100:141]).max() < 0.1

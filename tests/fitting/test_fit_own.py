@@ -28,7 +28,7 @@ def test_lorenz_is_fitted_from_noisy_states() -> None:
     result = udd.fit(seen, lorenz(sigma=9.0, rho=26.0, beta=3.0))
     assert result.converged and set(result.parameters) == {"sigma", "rho", "beta"}
     for name, true in lorenz().parameters.items():
-        # Of three parameters none is off by four standard errors but in one of 5000 records.
+        # One of three parameters is off by four standard errors in one of 5000 records.
         assert abs(result.parameters[name] - true) < 4.0 * result.errors[name]
         assert result.errors[name] < 0.02 * true
     # The noise is found as it is, to a few percent of 600 frames.
@@ -79,7 +79,8 @@ def test_a_term_that_is_missing_is_fitted() -> None:
     result = udd.fit(seen, swing.with_term("v", "v*abs(v)", drag=0.0))  # type: ignore[attr-defined]
     assert abs(result.parameters["drag"] + 0.05) < 4.0 * result.errors["drag"] < 0.01
     assert result.scatter < 1.2
-    # The model without it is held loosely, where its misfits are no larger; its evidence tells the two apart.
+    # The model without it has a large model error, with no larger misfits; its evidence distinguishes the
+    # two.
     assert result.evidence > udd.fit(seen, swing).evidence + 10.0
 
 

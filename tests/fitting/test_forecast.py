@@ -38,7 +38,7 @@ def rolled() -> tuple[udd.Measurement, udd.Forecast]:
 
 
 def test_the_fan_of_a_pendulum_covers_as_often_as_it_says() -> None:
-    """Where the model is exact and held tightly, coverage is the nominal one."""
+    """If the model is exact and its model error is small, coverage is the nominal one."""
     ahead, inside, z = np.array([0.0, 1.0, 4.0, 18.0]), [], []
     for rng in np.random.default_rng(2).spawn(30):
         truth = udd.Pendulum(rng.uniform(0.5, 1.5), k0=rng.uniform(0.005, 0.03))
@@ -153,7 +153,7 @@ def test_a_gap_before_the_start_is_not_filtered_across(swing: tuple[udd.Measurem
 
 
 def test_a_joint_fit_forecasts_each_of_its_films() -> None:
-    """Two films of one pendulum by cameras that lean by different angles."""
+    """Two films of one pendulum by cameras with different tilts."""
     t, lean = np.arange(0, 30, 0.05), (0.03, -0.05)
     rng = np.random.default_rng(8)
     true = [udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, a]).state[:, 1] for a in (0.5, 0.9)]
@@ -164,7 +164,7 @@ def test_a_joint_fit_forecasts_each_of_its_films() -> None:
     joint = udd.fit(films, udd.Pendulum(1.0, k0=0.03))
     for k, film in enumerate(films):
         result = udd.forecast(film, joint, [0.0, 2.0], start=20.0, members=20)
-        # Where the first camera's lean taken for the second's would be wrong by 0.08.
+        # The first camera's tilt for the second film would cause an error of 0.08.
         np.testing.assert_allclose(result.median[:, 0], (true[k] + lean[k])[[400, 440]], atol=3e-3)
     cut = films[1].slice(0, 20.01)
     with pytest.raises(FitError, match="pass the number of this one"):

@@ -53,7 +53,7 @@ def test_a_missing_effect_leaves_colour() -> None:
 
 @pytest.mark.parametrize("memory", [0.0, 0.6])
 def test_innovations_are_those_of_dense_algebra(memory: float) -> None:
-    """What is seen of a linear system is jointly Gaussian: Cholesky takes from each what went before."""
+    """Observations of a linear system are jointly Gaussian: Cholesky subtracts each prediction."""
     rng, dt, n = np.random.default_rng(8), 0.1, 60
     model = udd.Model(["x", "v"], {"x": "v", "v": "-k*x"}, {"k": 2.0})
     t = dt * np.arange(n)
@@ -75,7 +75,7 @@ def test_innovations_are_those_of_dense_algebra(memory: float) -> None:
     for i in range(n):
         for j in range(i + 1):
             moved = np.linalg.matrix_power(step, i - j) @ spread[j]
-            # The noise begins anew after a frame that was not seen.
+            # The noise starts again after a frame that was not observed.
             noise = sd[i] * sd[j] * memory ** (i - j) if (i < 30) == (j < 30) else 0.0
             covariance[i, j] = covariance[j, i] = moved[0, 0] + (noise if memory or i == j else 0.0)
     # The fitted states miss the model by their defects, which move all that comes after.
@@ -116,7 +116,7 @@ def test_ljung_box_is_the_textbooks() -> None:
 
 
 def test_the_means_of_residuals_have_honest_errors(fits: list[udd.Fit]) -> None:
-    """What is binned is smooth over several frames: errors of white noise would be half of the truth."""
+    """Binned residuals are smooth over several frames: errors for white noise would be half of the truth."""
     z = []
     for fit in fits:
         loose = loosest(fit)

@@ -31,7 +31,7 @@ def test_extrapolation_takes_the_bias_of_the_gain_away() -> None:
         result = udd.fit(record(seed, 0.3, 0.05), off)
         plain.append(result.parameters["g"])
         corrected.append(udd.input_bias(result).corrected["g"])
-    # Of eight records the plain gain is too small beyond doubt; the corrected one's mean is the truth.
+    # Over eight records the plain gain is significantly too small; the corrected mean is the truth.
     error = np.std(plain, ddof=1) / np.sqrt(8)
     assert np.mean(plain) < 2.0 - 4.0 * error
     assert abs(np.mean(corrected) - 2.0) < 3.0 * np.std(corrected, ddof=1) / np.sqrt(8)
@@ -69,7 +69,7 @@ def test_a_model_without_inputs_has_no_such_bias() -> None:
     ],
 )
 def test_a_drive_that_is_white_itself_is_not_taken_for_noise(hold: Any, search: bool) -> None:
-    """As of a pseudo-random binary signal, or of noise that was put in on purpose and is known."""
+    """A pseudo-random binary signal, or noise that was added on purpose and is known, has no noise."""
     rng = np.random.default_rng(0)
     t = np.arange(0.0, 20.0, 0.02)
     values = np.sign(rng.normal(size=len(t))) if hold == "zero" else rng.normal(size=len(t))

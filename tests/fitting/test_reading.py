@@ -1,4 +1,4 @@
-"""What a record shows of its sensor: steps, noise, and whether it was an encoder."""
+"""Sensor properties from a record: steps, noise, and whether it was an encoder."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_the_noise_is_that_of_the_step_or_of_the_frames():
     [
         (2 * np.pi / 14400, 0.0, True),
         (2 * np.pi / 14400, 1e-4, True),
-        (2 * np.pi / 14400, 2e-3, False),  # the steps are not what it is good to
+        (2 * np.pi / 14400, 2e-3, False),  # steps smaller than the noise
         (1e-3, 0.0, False),  # a table of three decimals
         (np.radians(0.1), 0.0, False),
         (0.0, 1e-3, False),
@@ -82,7 +82,7 @@ def test_readings_that_repeat_tell_what_one_would():
 
 
 def test_a_film_that_is_better_than_its_geometry_is_told_both_ways():
-    """A search counts on no more than half of 5 mrad; what the frames scatter by is told beside it."""
+    """A search assumes at least half of 5 mrad; the scatter of the frames is reported too."""
     noise = 1e-3
     (result,) = udd.discover(swing(0.0, noise, duration=60.0), udd.Pendulum(0.79)).noise
     # 3000 frames tell their scatter to 1.3 %; three of it.
@@ -106,7 +106,7 @@ def test_stated_noise_is_shared_by_readings_that_repeat():
 
 @pytest.mark.parametrize("stated", [False, True])
 def test_an_encoder_at_rest_shows_nothing_missing_whether_its_noise_is_stated_or_not(stated):
-    """Two thirds of the record are one reading, which says as much as one: not that there is no noise."""
+    """Two thirds of the record are one reading, with the information of one: the noise is not zero."""
     t, step = np.arange(0, 60, 0.02), 2 * np.pi / 4096
     theta = udd.simulate(udd.Pendulum(0.34, k0=0.1), t, [0.0, 0.7]).state[:, 1]
     theta = theta + 2e-4 * np.random.default_rng(0).standard_normal(len(t))
@@ -115,7 +115,7 @@ def test_an_encoder_at_rest_shows_nothing_missing_whether_its_noise_is_stated_or
     measured = udd.Measurement(t, {"theta": np.round(theta / step) * step}, sigma=sigma)
     result = udd.discover(measured, udd.Pendulum(0.34, k0=0.1))
     assert result.verdict == "nothing missing" and not result.fit.doubts.missing
-    # The encoder's own error is told, to what 2e-4 beside it add: not that of 2000 frames that share one.
+    # The encoder's own error is reported, with 2e-4 of other noise: not that of 2000 frames that share one.
     assert result.noise[0].noise == pytest.approx(sd, rel=0.15)
 
 

@@ -42,9 +42,9 @@ def test_what_was_held_contributes_as_a_fit_with_another_value_moves(fitted: udd
     k = result.sources.index("g")
     for i, name in enumerate(result.values):
         moved = abs(other.parameters[name] - fitted.parameters[name])
-        # The other fit estimates its noise anew: it moves by a few hundredths of a standard error for that.
+        # The other fit estimates its noise again, which moves it by a few hundredths of a standard error.
         assert result.contributions[i, k] == pytest.approx(moved, abs=0.1 * fitted.errors[name])
-    # Gravity is a scale of length over time squared; most of what is told of friction goes with it.
+    # Gravity is a scale of length over time squared; it dominates the uncertainty of friction.
     assert result.standard["k0"] > fitted.errors["k0"]
 
 

@@ -1,4 +1,4 @@
-"""Numbers in another unit than they are taken to be in, and strong effects that are not taken for that."""
+"""Numbers in a unit other than assumed, and strong effects that are not mistaken for a wrong unit."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
     doubted = replace(result, fit=far)
     (remark,) = doubted.remarks
     assert remark.startswith("A parameter is far from its given value: W = 0.0084 ± ")
-    # It stands beside the verdict, not instead of it.
+    # It is printed with the verdict, not instead of it.
     assert as_text(summary_of(doubted)).splitlines()[0] == as_text(summary_of(result)).splitlines()[0]
     assert f"  {remark}\n".replace("±", "+-") in as_text(summary_of(doubted))
     doubted.report(tmp_path / "page.html")

@@ -1,4 +1,4 @@
-"""Files of other programs: a known motion comes back from each; what is broken is told in one sentence."""
+"""Files of other programs: a known motion is read from each; a broken file is reported in one sentence."""
 
 from __future__ import annotations
 
@@ -296,7 +296,7 @@ def test_numpy_archives(tmp_path: Path) -> None:
 
 
 class Trap:
-    """What would run if it were unpickled."""
+    """Code that would run if it were unpickled."""
 
     def __reduce__(self) -> tuple[Callable[..., object], tuple[str, str]]:
         return open, ("ran", "w")

@@ -73,7 +73,7 @@ def test_nothing_is_missing_in_a_table_whose_times_are_rounded(tmp_path: Path):
     assert not result.doubts.missing and read.meta["clock"] in result.summary()
     assert result.parameters["k0"] == pytest.approx(right.parameters["k0"], abs=0.1 * right.errors["k0"])
     assert result.errors["k0"] == pytest.approx(right.errors["k0"], rel=0.05)
-    # What the package writes is read back as it was.
+    # A table that the package writes is read back unchanged.
     read.to_csv(tmp_path / "again.csv")
     assert np.array_equal(udd.read_measurement(tmp_path / "again.csv").t, read.t)
 

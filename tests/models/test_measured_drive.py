@@ -52,7 +52,8 @@ def test_a_pendulum_whose_pivot_is_moved() -> None:
 
     run = udd.simulate(model, T, [0.0, 0.5], method="auto", rtol=1e-10, atol=1e-12)
     truth = solve_ivp(law, (0.0, 4.0), [0.0, 0.5], method="DOP853", t_eval=T, rtol=1e-12, atol=1e-13).y.T
-    # The spline's second derivative is good to h^2/12 of the fourth: 2e-4 of 0.4 m/s^2, but at its ends.
+    # The spline's second derivative is accurate to h^2/12 of the fourth: 2e-4 of 0.4 m/s^2, but not at its
+    # ends.
     np.testing.assert_allclose(run.state, truth, atol=2e-3)
 
 

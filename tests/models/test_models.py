@@ -237,6 +237,6 @@ def test_friction_under_load_takes_the_load_from_how_the_centre_accelerates() ->
     k = np.maximum(0.103 - 0.055 * np.abs(omega), 0.012)
     inertia = 0.08**2 / 2 + y**2 + z**2
     added = -0.4 * (load - 1.0) * k * omega / inertia
-    # What differences leave, of rates up to some hundred.
+    # The error of differences, for rates up to some hundred.
     np.testing.assert_allclose(loaded.rates(0.0, states)[:, 0] - rates[:, 0], added, rtol=1e-6, atol=1e-5)
     np.testing.assert_array_equal(loaded.rates(0.0, states)[:, 1:], rates[:, 1:])

@@ -119,7 +119,7 @@ def test_a_force_enters_every_acceleration_through_the_mass_matrix() -> None:
     )
     assert free.speeds == {"a": "p", "b": "q", "c": "r"}
     np.testing.assert_allclose(free.mass_matrix(np.array([x, x]))[1], m, rtol=1e-15)
-    # A force on b with its reaction on a, beside one along c, and a term of an equation that knows no mass.
+    # A force on b with its reaction on a, one along c, and a term of an equation without a mass.
     joint = effects.formula("force(b - a)", "-m*(q - p)", name="joint", m=0.5)
     push = effects.formula("force(c)", "f", name="push", f=2.0)
     added = free.with_effects([joint, push, effects.formula("q'", "d", name="plain", d=10.0)])

@@ -1,4 +1,4 @@
-"""What is known of each model beside its equations; a new model is asked the same without another line."""
+"""Profiles of all models: a new model gets the same tests without another line."""
 
 from __future__ import annotations
 

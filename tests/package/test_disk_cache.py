@@ -1,4 +1,4 @@
-"""What tests share is computed once per run, whichever process needs it first."""
+"""Results that tests share are computed once per run, by the first process that needs them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_equal_arguments_are_computed_once(tmp_path: Path, monkeypatch: pytest.M
     once(record(), udd.Pendulum(0.6), by=2.0)
     once(record(), udd.Pendulum(0.5))
     assert len(calls) == 4
-    # Of another udd nothing is taken.
+    # Results of another udd are not used.
     monkeypatch.setattr("disk_cache.version", lambda: "another")
     once(record(), udd.Pendulum(0.5), by=2.0)
     assert len(calls) == 5

@@ -1,4 +1,4 @@
-"""What the public docstrings promise (numpydoc); that their examples run, pytest's doctest checks."""
+"""Promises of the public docstrings (numpydoc); pytest's doctest runs their examples."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
 
 
 def track(path: Path) -> None:
-    """What `udd track --out` ends with."""
+    """The last step of `udd track --out`."""
     t = np.arange(2000) / 25
     udd.Measurement(t, {"Y": np.sin(t), "Z": np.cos(t), "beta": t}, meta={"W": 0.04}).to_csv(path)
 

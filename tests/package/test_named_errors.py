@@ -19,7 +19,7 @@ SECTION = re.compile(
 
 
 def named() -> dict[str, str]:
-    """What the sections Raises and Warns of all docstrings name, and where it is named first."""
+    """Map the errors and warnings in all sections Raises and Warns to their first place."""
     result: dict[str, str] = {}
     for path in SOURCES:
         for section in SECTION.finditer(path.read_text(encoding="utf-8")):

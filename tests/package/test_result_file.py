@@ -41,7 +41,7 @@ def test_a_fit_comes_back_to_the_bit(swing: tuple[udd.Measurement, udd.Fit], tmp
     np.testing.assert_array_equal(again.residuals, fit.residuals)
     item, other = (udd.forecast(measured, f, 2.0, members=20) for f in (fit, again))
     np.testing.assert_array_equal(item.members, other.members)
-    # What is shared stays shared, and what was read is not written to.
+    # Shared objects stay shared, and loaded arrays are read-only.
     assert again.problem.models[0] is not None and again.problem.record is again.record
     assert again.measurement.meta == {"source": "made"} and not again.measurement.t.flags.writeable
 

@@ -1,4 +1,4 @@
-"""What every result has: one line of text, and labelled arrays."""
+"""Properties of every result: one line of text, and labelled arrays."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from udd.paper.figures.overturning import growth
 from udd.paper.savgol import smoothed
 from udd.paper.shared_films import Lab
 
-# What becomes of each claim. Those that do not hold are known from elsewhere too: the friction law has no
+# Verdicts on the claims. Those that do not hold are known from elsewhere too: the friction law has no
 # threshold, the disk is chaotic at 5.5 cm/s, the Hopf bifurcation is subcritical, a damped pendulum locks.
 HOLD = """limits angular-momentum scales zero-drive-swings slow-ascent higher-deeper ejection dle-3.9
 coexistence lorenz-limit waterwheel unforced-pendulum steady-torque diffusive-state unstable-rotation

@@ -213,7 +213,7 @@ def test_what_cannot_be_drawn_is_said(draw: Callable[[], Axes], said: str) -> No
 
 
 def test_the_map_frames_the_cell_that_the_effect_is_in() -> None:
-    """Of the hidden relaxation -b W Z: dZ/dT against Z is framed for the known model, nothing after it."""
+    """For a hidden relaxation -b W Z the known model's dZ/dT over Z is framed, and nothing after it."""
     from udd.plot.residual_map import _cells, beyond_chance
     from udd.report.loose_fit import loosest
 

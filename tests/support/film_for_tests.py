@@ -140,7 +140,7 @@ def frame(
     marks: bool = True,
     support: bool = True,
 ) -> NDArray[np.uint8]:
-    """What a camera records around time `t`: light added up over exposure and pixels, then grain."""
+    """Picture of a camera around time `t`: light added up over exposure and pixels, then grain."""
     y, z, _ = motion.at(t)
     u, v, reach = PIVOT[0] + SCALE * y, PIVOT[1] - SCALE * z, SCALE * RADIUS + 12
     box = (

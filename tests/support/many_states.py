@@ -26,7 +26,7 @@ def chain(n: int, **more: str) -> udd.Model:
 
 
 def chain_rates(t: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rates of :func:`chain`, written anew in NumPy."""
+    """Compute the rates of :func:`chain` independently in NumPy."""
     x, v = state[0::2], state[1::2]
     beside = np.concatenate([[0.0], x, [0.0]])
     force = -x - x**3 - 0.05 * v + 0.6 * (beside[:-2] - 2 * x + beside[2:])
@@ -44,5 +44,5 @@ def ring(n: int) -> udd.Model:
 
 
 def ring_rates(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rates of :func:`ring`, written anew in NumPy."""
+    """Compute the rates of :func:`ring` independently in NumPy."""
     return (np.roll(x, -1) - np.roll(x, 2)) * np.roll(x, 1) - x + 8.0

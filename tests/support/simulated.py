@@ -13,7 +13,7 @@ from udd.simulation.trajectory import integrated
 
 @dataclass(frozen=True)
 class Camera:
-    """What a camera gets wrong. Lengths in m, angles in rad, times in s."""
+    """Errors of a camera."""
 
     noise: float = 5e-4
     angle_noise: float = 7e-3

@@ -56,7 +56,7 @@ def bump(z: np.ndarray) -> np.ndarray:
 
 
 def load(o: float, y: float, z: float, w: float) -> float:
-    """By how much of its weight the disk presses on the wheels more than at rest: F/g - 1."""
+    """Return the excess of the disk's force on the wheels over that at rest, in weights: F/g - 1."""
     inertia = R * R / 2 + y * y + z * z
     turning = (G * y - max(K1 - K2 * abs(o), K0) * o - z * w * o) / inertia
     return -(z * o * o + y * turning) / G
