@@ -273,7 +273,9 @@ def test_what_comes_nearest_is_told_but_not_added():
         assert close.p >= confirmation.ALPHA
         assert close.ratio[2] < 1.0
         assert close.errors.whole < result.error_before.whole
-    assert [close_ones["name"] for close_ones in result.to_dict()["refused"]] == [n.effect.name for n in result.rejected]
+    assert [close_ones["name"] for close_ones in result.to_dict()["refused"]] == [
+        n.effect.name for n in result.rejected
+    ]
     assert "would bring the held-out error" in wording.rejected(result)[0]
     twin = replace(result.rejected[0], title="its twin")
     shared = wording.rejected(replace(result, rejected=[result.rejected[0], twin]))
