@@ -165,7 +165,7 @@ class Acceptance:
         self.free = free
 
     @property
-    def known(self) -> list[str]:
+    def known_parameters(self) -> list[str]:
         """Names of the known model's free parameters."""
         return [f.name for f in self.free if f.role == "model"]
 
@@ -187,7 +187,7 @@ class Acceptance:
     ) -> tuple[Step, SearchState] | None:
         """The likeliest hypothesis, if it passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
-        order = named(ranked(self.hypotheses(current, trials, scores)), self.known)
+        order = named(ranked(self.hypotheses(current, trials, scores)), self.known_parameters)
         # Where the likeliest fails a test, a clearly less likely one is not named instead.
         most = max((h.log_z for h in order), default=0.0)
         for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
@@ -234,12 +234,14 @@ class Acceptance:
             evidence = self.clock.each(first, trials)
             most = max(evidence, default=0.0) - _WIDE * EVIDENCE_MARGIN
             likely = sorted(zip(evidence, trials, strict=True), key=lambda pair: -pair[0])
-            near = [trial for z, trial in likely if z > most]
+            leading = [trial for z, trial in likely if z > most]
         else:  # what is held as stated bends forms: only with it free, and all data, do they compare
             least = min((t.fit.scatter for t in trials), default=0.0)
-            near = sorted((t for t in trials if t.fit.scatter < _BENT * least), key=lambda t: t.fit.scatter)
-        likeliest = {id(trial) for trial in near[:_COMPARED]}
-        near = [trial for trial in trials if id(trial) in likeliest]
+            leading = sorted(
+                (t for t in trials if t.fit.scatter < _BENT * least), key=lambda t: t.fit.scatter
+            )
+        likeliest = {id(trial) for trial in leading[:_COMPARED]}
+        leading = [trial for trial in trials if id(trial) in likeliest]
 
         def whole(trial: TrialFit) -> Hypothesis | None:
             try:
@@ -253,7 +255,7 @@ class Acceptance:
         def wholes(some: Sequence[TrialFit]) -> list[Hypothesis]:
             return [h for h in self.clock.each(whole, some) if h is not None]
 
-        result = wholes(near)
+        result = wholes(leading)
         result += wholes(self._written(current, ranked(result)))
         return result + wholes(self._shortened(current, ranked(result)))
 
@@ -273,7 +275,7 @@ class Acceptance:
         pairs: dict[tuple[tuple[str, ...], str], tuple[Curve, Formula]] = {}
         for curve, _own in sought:
             for other, formulas in sought:
-                if other.kin == curve.kin:
+                if other.key_without_momentum == curve.key_without_momentum:
                     pairs |= {(curve.name, f.text): (curve, f) for f in formulas}
         some = list(pairs.values())
         self.clock.trying([formula.text for _curve, formula in some])
@@ -376,13 +378,13 @@ class Acceptance:
         starts = [current.whole, started_at(current.whole, trial.fit, ~self.held_out)]
         if far_off(current.whole):
             starts.reverse()
-        found = []
+        refits = []
         for start in starts:
             one = _fitted_to(start, trial)
             if one and one.fit.level >= trial.fit.level and one.fit.scatter < _ASTRAY * trial.fit.scatter:
                 return one
-            found.append(one)
-        return min(fitted_ones(found), key=lambda t: t.rank, default=None)
+            refits.append(one)
+        return min(fitted_ones(refits), key=lambda t: t.rank, default=None)
 
     def worse(self, before: Errors, after: Errors) -> bool:
         """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
@@ -395,7 +397,7 @@ class Acceptance:
     ) -> list[Alternative]:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
-        for other in rivals(chosen, order, self.known):
+        for other in rivals(chosen, order, self.known_parameters):
             for mine, theirs in _beside(chosen.trial.candidates, other.trial.candidates):
                 if theirs.title == mine.title:
                     continue  # but for the width that its sign is smoothed over
@@ -405,11 +407,11 @@ class Acceptance:
                 fitted = other.again.fit.parameters
                 effect = theirs.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
                 nats = chosen.log_z - other.log_z
-                one = Alternative(
+                alternative = Alternative(
                     mine.effect.name, effect, theirs.title, theirs.effect.equation, nats, likeness
                 )
                 # The same may stand beside several partners; the best is told.
                 key = (mine.effect.name, theirs.title, theirs.effect.momentum)
                 if key not in result or nats < result[key].nats:
-                    result[key] = one
+                    result[key] = alternative
         return list(result.values())

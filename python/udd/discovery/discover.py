@@ -45,7 +45,7 @@ from udd.models.formula_model import FormulaModel
 
 from .acceptance import Acceptance, SearchState, Step
 from .results import AddedEffect, Discovery, RejectedEffect
-from .search import Search, both
+from .search import Search, map_fits
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
@@ -363,7 +363,7 @@ def _begin(search: Search, start: SearchState) -> SearchState:
         return start
     # Without this a formula of the friction replaces a strong cubic drag.
     try:
-        part, whole = both(as_stated, start.part, start.whole)
+        part, whole = map_fits(as_stated, start.part, start.whole)
         return SearchState(part, whole, search.tests.errors(part))
     except FitError:
         return start

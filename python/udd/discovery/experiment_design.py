@@ -243,7 +243,7 @@ class _Pair:
         rises = _rise(information, effects, rival_effects, a), _rise(information, rival_effects, effects, b)
         return 0.5 * min(rises) / max(self.fit.scatter, 1.0)
 
-    def _with(self, more: tuple[Film, tuple[Array, Array]] | None) -> tuple[Problem, Point]:
+    def _with(self, further: tuple[Film, tuple[Array, Array]] | None) -> tuple[Problem, Point]:
         """Return the problem without the chosen form and with a further film, at the expected solution."""
         fit, problem = self.fit, self.fit.problem
         models = tuple(self._without(m) for m in fit.models)
@@ -251,10 +251,10 @@ class _Pair:
             FilmParameters(list(m.parameters.values()), camera, clock)
             for m, (_values, camera, clock) in zip(models, fit.point.sets, strict=True)
         ]
-        if more is None:
+        if further is None:
             alone = replace(problem, models=models, free=self.free)
             return alone, Point(fit.states, tuple(sets))
-        film, (t, states) = more
+        film, (t, states) = further
         number = 0 if film.again else len(models)
         record = _longer(fit.record, t, states, number)
         weight = np.concatenate([problem.noise.weight, np.ones(len(t))])
@@ -306,7 +306,7 @@ def _longer(record: Record, t: Array, states: Array, film: int) -> Record:
     )
 
 
-def _for_films(free: Sequence[Free], models: Sequence[Model], more: Model) -> tuple[Free, ...]:
+def _for_films(free: Sequence[Free], models: Sequence[Model], further: Model) -> tuple[Free, ...]:
     """Return the free parameters with a further film, which has its own drive and camera."""
     if len(models) == 1:
         free = [replace(f, film=0, name=f"{f.name}[0]") if is_film_specific(f) else f for f in free]
@@ -316,7 +316,7 @@ def _for_films(free: Sequence[Free], models: Sequence[Model], more: Model) -> tu
         name = f.name.split("[")[0]
         other = replace(f, film=len(models), name=f"{name}[{len(models)}]")
         if f.role == "model" and models[0].parameters[name]:
-            times = more.parameters[name] / models[0].parameters[name]
+            times = further.parameters[name] / models[0].parameters[name]
             other = replace(other, mean=f.mean * times, sd=f.sd * abs(times))
         added.append(other)
     return (*free, *added)

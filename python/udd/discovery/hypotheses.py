@@ -109,7 +109,7 @@ def log_prior(trial: TrialFit, terms: int) -> float:
     return len(trial.candidates) * single - unusual - EVIDENCE_MARGIN * trial.is_curve
 
 
-def contains(law: Hypothesis, other: Hypothesis, known: Sequence[str]) -> bool:
+def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]) -> bool:
     """Return True if one law can do what another one does, along the motion that was fitted with it.
 
     The law's constants are fitted to the other one's rates by least squares. What the parameters of the known
@@ -118,7 +118,7 @@ def contains(law: Hypothesis, other: Hypothesis, known: Sequence[str]) -> bool:
     Parameters
     ----------
     law, other : Hypothesis
-    known : sequence of str
+    known_parameters : sequence of str
         Names of the known model's free parameters.
     """
     first = other.whole.record.film == 0
@@ -128,7 +128,7 @@ def contains(law: Hypothesis, other: Hypothesis, known: Sequence[str]) -> bool:
     model = other.whole.model
     plain = model.with_effects(model.effects[: len(model.effects) - len(other.trial.candidates)])
     without = plain.rates(t, states)
-    able = by_parameter(plain, [name for name in known if name in plain.parameters], t, states)
+    able = by_parameter(plain, [name for name in known_parameters if name in plain.parameters], t, states)
     basis = np.linalg.qr(able)[0]
 
     def left(rates: Array) -> Array:
@@ -188,14 +188,14 @@ def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     return sorted(hypotheses, key=lambda h: round(most - h.log_z))
 
 
-def named(order: Sequence[Hypothesis], known: Sequence[str]) -> list[Hypothesis]:
+def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[Hypothesis]:
     """The hypotheses in order, but first the library's law if it says the same as the formula that leads.
 
     Parameters
     ----------
     order : sequence of Hypothesis
         The best first.
-    known : sequence of str
+    known_parameters : sequence of str
         Names of the known model's free parameters.
     """
     if not order or order[0].trial.formula is None:
@@ -203,12 +203,14 @@ def named(order: Sequence[Hypothesis], known: Sequence[str]) -> list[Hypothesis]
     first = order[0]
     for other in order[1:]:
         near = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
-        if near and other.constants <= first.constants and contains(other, first, known):
+        if near and other.constants <= first.constants and contains(other, first, known_parameters):
             return [other, *(h for h in order if h is not other)]
     return list(order)
 
 
-def rivals(chosen: Hypothesis, others: Sequence[Hypothesis], known: Sequence[str]) -> list[Hypothesis]:
+def rivals(
+    chosen: Hypothesis, others: Sequence[Hypothesis], known_parameters: Sequence[str]
+) -> list[Hypothesis]:
     """The hypotheses that the data cannot tell from the chosen one.
 
     Those within ten nats of it, but no spline beside a law, nothing that the chosen one contains, and
@@ -223,9 +225,9 @@ def rivals(chosen: Hypothesis, others: Sequence[Hypothesis], known: Sequence[str
                 result.append(other)
             continue
         wider = other.constants > chosen.constants
-        if wider and other.log_z <= chosen.log_z and contains(other, chosen, known):
+        if wider and other.log_z <= chosen.log_z and contains(other, chosen, known_parameters):
             continue
-        if not wider and other.trial.formula is not None and contains(chosen, other, known):
+        if not wider and other.trial.formula is not None and contains(chosen, other, known_parameters):
             continue  # the chosen law in other words
         result.append(other)
     return result

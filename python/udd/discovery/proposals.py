@@ -93,8 +93,8 @@ class Proposals:
             return []
         likely = [c for c in single if c.evidence > single[0].evidence - EVIDENCE_MARGIN]
         likely += [c for c in single if c.name == ("friction", "|Omega|") and c not in likely]
-        kinds = list(dict.fromkeys(c.kin for c in likely))[:_COORDINATES]
-        return [c for c in likely if c.kin in kinds]
+        kinds = list(dict.fromkeys(c.key_without_momentum for c in likely))[:_COORDINATES]
+        return [c for c in likely if c.key_without_momentum in kinds]
 
     def only_together(self, loose: set[str]) -> tuple[list[TrialFit], int]:
         """Fit pairs of effects that may pass only together, except `loose` ones; also count all pairs."""

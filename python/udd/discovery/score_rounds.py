@@ -69,15 +69,15 @@ class ScoreRound:
 
     def strongest(self) -> float:
         """Return the gain of the best explanation."""
-        return max([c.evidence for c in self.curves] + [self._known()], default=0.0)
+        return max([c.evidence for c in self.curves] + [self._library_gain()], default=0.0)
 
     def curve_leads(self) -> bool:
         """Return True if a curve over one coordinate gains far more than every effect of the library."""
         best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
         leads = _LEADS_OFF_TRACK if self.off_track else _LEADS
-        return best > leads * max(self._known(), 0.0) + EVIDENCE_MARGIN
+        return best > leads * max(self._library_gain(), 0.0) + EVIDENCE_MARGIN
 
-    def _known(self) -> float:
+    def _library_gain(self) -> float:
         """Return the gain of the library's best effect."""
         return max((self.nats(s) for s in self.library.scored if s.physical), default=-math.inf)
 

@@ -38,7 +38,7 @@ _CURVES = 2  # of the likeliest, located
 _LIKELY = 0.5  # of the evidence for the likeliest, which they have at least
 
 
-def both(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
+def map_fits(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
     """The same done to the fits of the first part and of all data, once where they are one."""
     if part is whole:
         return (work(part),) * 2
@@ -69,8 +69,8 @@ class Search:
         self.tests, self.given = tests, given
         self.clock, self.tell = tests.clock, tests.clock.tell
 
-    def run(self, begin: SearchState, known: SearchState | None = None) -> Outcome:
-        """Add effects until none passes, from where the search begins; `known` is the known model's fit."""
+    def run(self, begin: SearchState, known_model: SearchState | None = None) -> Outcome:
+        """Add effects to the first state until none passes; `known_model` has the fits of the known model."""
         accepted: list[Step] = []
         rounds: list[ScoreRound] = []
         states = [begin]
@@ -79,16 +79,16 @@ class Search:
             self._forward_selection(accepted, states, rounds)
         except TimeUpError as up:
             stopped = str(up)
-        number = self._confirmed_by_free_runs(known or states[0], states)
-        unconfirmed = self._unconfirmed(known or states[0], accepted[number:], states[-1])
-        end = states[number] if number else known or states[0]
+        number = self._confirmed_by_free_runs(known_model or states[0], states)
+        unconfirmed = self._unconfirmed(known_model or states[0], accepted[number:], states[-1])
+        end = states[number] if number else known_model or states[0]
         return Outcome(end.part, end.whole, end.errors, accepted[:number], rounds, unconfirmed, stopped)
 
     def _forward_selection(
         self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
     ) -> None:
         """Add effects to the lists as they pass."""
-        known: set[tuple[str, ...]] = set()
+        seen_titles: set[tuple[str, ...]] = set()
         while sum(len(step.candidates) for step in accepted) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
@@ -99,16 +99,16 @@ class Search:
             chaotic = states[-1].part.model.profile.discovery.chaotic
             first = scores.curve_leads() and (accepted or scores.off_track or chaotic)
             tried = scores.passing_curves() if first else []
-            found = self._located(states[-1], scores) if tried else None
-            found = found or self._known(states[-1], scores)
-            if found is None:
+            addition = self._located(states[-1], scores) if tried else None
+            addition = addition or self._library_step(states[-1], scores)
+            if addition is None:
                 self.tell("scoring surfaces over two coordinates")
                 rounds[-1] = scores = with_surfaces(scores)
-                found = self._located(states[-1], scores, tried)
-            if found is None:
+                addition = self._located(states[-1], scores, tried)
+            if addition is None:
                 break
-            accepted.append(found[0])
-            states.append(found[1])
+            accepted.append(addition[0])
+            states.append(addition[1])
             self._backward_elimination(accepted, states, rounds)
             bent, states[-1] = states[-1], self._released(states[-1])
             if states[-1] is not bent and accepted[-1].is_curve:
@@ -116,30 +116,32 @@ class Search:
                 self._relocated(len(accepted) - 1, accepted, states, rounds)
             # What takes another's place may give way to it again: then the search goes in circles.
             titles = tuple(c.title for step in accepted for c in step.candidates)
-            if titles in known:
+            if titles in seen_titles:
                 break
-            known.add(titles)
+            seen_titles.add(titles)
             # What no library has, and free runs contradict, is no ground to search on from.
             contradicted = self.tests.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
             if accepted[-1].curve is not None and contradicted:
                 break
 
-    def _confirmed_by_free_runs(self, known: SearchState, states: list[SearchState]) -> int:
+    def _confirmed_by_free_runs(self, known_model: SearchState, states: list[SearchState]) -> int:
         """How many of the steps free runs on the held-out data confirm."""
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
             one_more = self.tests.improvement(states[number - 1].errors, errors)
-            ratio = self.tests.improvement(known.errors, errors)
-            if not confirmed(known.errors, ratio) or one_more[1] > 1.0:
+            ratio = self.tests.improvement(known_model.errors, errors)
+            if not confirmed(known_model.errors, ratio) or one_more[1] > 1.0:
                 continue
             # Runs that are too short to show it do not confirm what forces at random do as well.
-            if ratio[2] < 1.0 or as_random(known.whole, states[number].whole) is None:
+            if ratio[2] < 1.0 or as_random(known_model.whole, states[number].whole) is None:
                 return number
         return 0
 
-    def _unconfirmed(self, known: SearchState, steps: list[Step], end: SearchState) -> list[RejectedEffect]:
+    def _unconfirmed(
+        self, known_model: SearchState, steps: list[Step], end: SearchState
+    ) -> list[RejectedEffect]:
         """What passed all other tests."""
-        ratio = self.tests.improvement(known.errors, end.errors)
+        ratio = self.tests.improvement(known_model.errors, end.errors)
         return [
             RejectedEffect(
                 effect=next(e for e in end.whole.model.effects if e.name == c.effect.name),
@@ -165,7 +167,7 @@ class Search:
         if self.tests.all_are_free(state.part) and not anew:
             return state
         try:
-            part, whole = both(partial(released_anew, free=self.tests.free), state.part, state.whole)
+            part, whole = map_fits(partial(released_anew, free=self.tests.free), state.part, state.whole)
             if not (part.converged and whole.converged):
                 return state
             errors = self.tests.errors(part)
@@ -185,10 +187,10 @@ class Search:
         these best where each has its own amplitude.
         """
         strongest: dict[object, Scored] = {}
-        for one in scores.usable():
-            strongest.setdefault((one.candidate.effect.name, one.candidate.effect.momentum), one)
+        for scored in scores.usable():
+            strongest.setdefault((scored.candidate.effect.name, scored.candidate.effect.momentum), scored)
         shown = [s.candidate for s in scores.passing()]
-        rejected, apart = [], []
+        rejected, record_dependent = [], []
         proposals = Proposals(base.part, scores, self.clock)
         for trial in proposals.tried(list(strongest.values())[:_NEAREST]):
             if trial.fit.level < base.part.level:
@@ -208,22 +210,22 @@ class Search:
             effect, ratio = judged.whole.model.effects[-1], self.tests.improvement(base.errors, errors)
             answers, chi2 = by_record(base.whole, judged.whole, effect, numbers)
             title = trial.candidates[0].title
-            told = RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why, answers)
-            rejected.append(told)
+            rejection = RejectedEffect(effect, title, judged.chi2, judged.p, errors, ratio, why, answers)
+            rejected.append(rejection)
             if contested(answers):
-                apart.append((chi2, told))
-        near = sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
-        if not apart:
-            return near
-        best = min(apart, key=lambda pair: pair[0])[1]
-        return [replace(best, why="records"), *(r for r in near if r is not best)]
+                record_dependent.append((chi2, rejection))
+        near_misses = sorted((r for r in rejected if r.ratio[2] < 1.0), key=lambda r: r.ratio[0])
+        if not record_dependent:
+            return near_misses
+        best = min(record_dependent, key=lambda pair: pair[0])[1]
+        return [replace(best, why="records"), *(r for r in near_misses if r is not best)]
 
-    def _known(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
+    def _library_step(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
         """The best addition of the library that passes: an effect, or two of them together."""
         proposals = Proposals(current.part, scores, self.clock)
         trials, loose = proposals.effects()
-        if found := self.tests.best(current, trials, scores):
-            return found
+        if single := self.tests.best(current, trials, scores):
+            return single
         together, number = proposals.only_together(loose)
         return self.tests.best(current, together, replace(scores, comparisons=number))
 
@@ -236,13 +238,13 @@ class Search:
             most = max((c.evidence for c in curves), default=0.0)
             one_each: dict[tuple[str, ...], list[Curve]] = {}
             for curve in states_first([c for c in curves if c.evidence > _LIKELY * most]):
-                one_each.setdefault(curve.kin, []).append(curve)
+                one_each.setdefault(curve.key_without_momentum, []).append(curve)
             # A velocity with its momentum and without: which of them it is a full fit says.
             groups = list(one_each.values())[:_CURVES]
-            return [*groups[0], *(curve for curve, *_kin in groups[1:])] if groups else []
+            return [*groups[0], *(curve for curve, *_others in groups[1:])] if groups else []
 
-        known = [c.name for c in best(tried)]
-        likely = [c for c in best(scores.passing_curves()) if c.name not in known]
+        tried_names = [c.name for c in best(tried)]
+        likely = [c for c in best(scores.passing_curves()) if c.name not in tried_names]
         trials = Proposals(current.part, scores, self.clock).curves(likely)
         return self.tests.best(current, trials, scores)
 
@@ -273,21 +275,23 @@ class Search:
             return False
         from_there = started_at(before.part, states[-1].part)
         trials = Proposals(from_there, rounds[k], self.clock).curves([curve])
-        found = self.tests.best(before, trials, rounds[k])
-        if found is None:
+        replacement = self.tests.best(before, trials, rounds[k])
+        if replacement is None:
             return False
-        found = found[0], self._released(found[1], anew=True)
-        if not self._likelier(found, accepted[k:], states[-1]):
+        replacement = replacement[0], self._released(replacement[1], anew=True)
+        if not self._likelier(replacement, accepted[k:], states[-1]):
             return False
-        accepted[k:], states[k + 1 :], rounds[k + 1 :] = [found[0]], [found[1]], []
+        accepted[k:], states[k + 1 :], rounds[k + 1 :] = [replacement[0]], [replacement[1]], []
         return True
 
-    def _likelier(self, found: tuple[Step, SearchState], steps: Sequence[Step], end: SearchState) -> bool:
+    def _likelier(
+        self, replacement: tuple[Step, SearchState], steps: Sequence[Step], end: SearchState
+    ) -> bool:
         """Return True if one step has a larger log evidence than several from the same start."""
-        step, state = found
+        step, state = replacement
         try:
-            one = self.tests.log_evidence(state.whole, [step])
-            return one > self.tests.log_evidence(end.whole, steps)
+            evidence = self.tests.log_evidence(state.whole, [step])
+            return evidence > self.tests.log_evidence(end.whole, steps)
         except FitError:
             return False
 
@@ -298,27 +302,29 @@ class Search:
         """
         whole = states[-1].whole
         idle = [
-            (k, one)
+            (k, candidate)
             for k, step in enumerate(accepted[:-1])
-            for one in step.candidates
-            if not any(s.curve for s in accepted[k:]) and not needed_in(whole, one.amplitude_names)
+            for candidate in step.candidates
+            if not any(s.curve for s in accepted[k:]) and not needed_in(whole, candidate.amplitude_names)
         ]
-        for group in [idle, *([one] for one in idle)] if len(idle) > 1 else [idle] if idle else []:
-            k, names = group[0][0], {one.effect.name for _k, one in group}
+        for group in (
+            [idle, *([candidate] for candidate in idle)] if len(idle) > 1 else [idle] if idle else []
+        ):
+            k, names = group[0][0], {candidate.effect.name for _k, candidate in group}
             later = accepted[k:]
-            self.tell(f"trying without {' and '.join(one.title for _k, one in group)}")
+            self.tell(f"trying without {' and '.join(candidate.title for _k, candidate in group)}")
             kept = [c for s in later for c in s.candidates if c.effect.name not in names]
             values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
             from_there = started_at(states[k].part, states[-1].part)
             trial = of_library(from_there, kept, values)
-            found = self.tests.best(states[k], fitted_ones([trial]), rounds[k])
-            if found is None:
+            replacement = self.tests.best(states[k], fitted_ones([trial]), rounds[k])
+            if replacement is None:
                 continue
-            found = found[0], self._released(found[1])
-            if not self._likelier(found, later, states[-1]):
+            replacement = replacement[0], self._released(replacement[1])
+            if not self._likelier(replacement, later, states[-1]):
                 continue
             left = {c.effect.name for c in kept}
             others = [a for s in later for a in s.alternatives if a.instead_of in left]
-            accepted[k:] = [replace(found[0], alternatives=others)]
-            states[k + 1 :], rounds[k + 1 :] = [found[1]], []
+            accepted[k:] = [replace(replacement[0], alternatives=others)]
+            states[k + 1 :], rounds[k + 1 :] = [replacement[1]], []
             return

@@ -359,12 +359,14 @@ class _Pruning:
             (f.name, self._with(current, f.name, g / i))
             for f, g, i in zip(fixed, gradient, diagonal, strict=True)
         ]
-        hopes = [(self._hope(more, name), name, more) for name, more in wider if more is not None]
-        for hope, name, more in sorted(hopes, key=lambda h: h[0])[:_TRIED]:
+        hopes = [
+            (self._hope(extended, name), name, extended) for name, extended in wider if extended is not None
+        ]
+        for hope, name, extended in sorted(hopes, key=lambda h: h[0])[:_TRIED]:
             if hope > self.criterion(current) + _HOPELESS:
                 break
             # The restored term would be the first to be removed.
-            after = self._tightened(self._without(self._without(more, kept=name)))
+            after = self._tightened(self._without(self._without(extended, kept=name)))
             level = min(after.level, current.level)
             if self.criterion(at_level(after, level)) < self.criterion(at_level(current, level)) - _EQUAL:
                 self.tell(f"with {name} again")

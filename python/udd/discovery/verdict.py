@@ -20,13 +20,13 @@ _DETERMINED = 3.0  # standard errors
 
 
 def verdict_of(
-    found: Sequence[AddedEffect], unconfirmed: bool, doubts: Sequence[str], open_form: bool, stopped: bool
+    added: Sequence[AddedEffect], unconfirmed: bool, doubts: Sequence[str], open_form: bool, stopped: bool
 ) -> str:
     """The first that holds of these, from what is least to what is most sure.
 
     Parameters
     ----------
-    found : sequence of AddedEffect
+    added : sequence of AddedEffect
     unconfirmed : bool
         Whether something was found in the first part that free runs over the rest do not confirm.
     doubts : sequence of str
@@ -36,21 +36,21 @@ def verdict_of(
     stopped : bool
         Whether the search had no more time.
     """
-    if not found and unconfirmed:
+    if not added and unconfirmed:
         return "fits the first part, not confirmed"
     if open_form or doubts:
         return "effect present, form not identified"
-    if found:
+    if added:
         return "effect identified"
     return "search not finished" if stopped else "nothing missing"
 
 
-def doubts_of(found: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: int) -> list[str]:
+def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: int) -> list[str]:
     """What speaks against naming the form of what was found, in sentences; empty where nothing does.
 
     Parameters
     ----------
-    found : sequence of AddedEffect
+    added : sequence of AddedEffect
     final : Fit
         With them, of all data.
     ratio : tuple of float
@@ -59,22 +59,22 @@ def doubts_of(found: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
         How many numbers were held out.
     """
     result = []
-    for one in found:
-        if contested(one.by_record):
-            result.append(f"Only some of the records want {one.title}.")
-        if one.like_a_drift(final.model):
-            result.append(f"{one.title} may be the drift of a sensor's zero.")
+    for effect in added:
+        if contested(effect.by_record):
+            result.append(f"Only some of the records want {effect.title}.")
+        if effect.like_a_drift(final.model):
+            result.append(f"{effect.title} may be the drift of a sensor's zero.")
         # Without this the friction of a pendulum with a power of 1.2 is identified as one that settles.
-        if brakes_with_time(one.effect):
-            result.append(f"{one.title}: as a swing dies down, the time stands for its size as well.")
-        if not one.is_law:
-            result.append(f"{one.title} is a curve, written as a formula: no law of one term.")
-        elif open_constants := undetermined(one, final):
-            result.append(f"{one.title}: the data do not determine {', '.join(open_constants)}.")
+        if brakes_with_time(effect.effect):
+            result.append(f"{effect.title}: as a swing dies down, the time stands for its size as well.")
+        if not effect.is_law:
+            result.append(f"{effect.title} is a curve, written as a formula: no law of one term.")
+        elif open_constants := undetermined(effect, final):
+            result.append(f"{effect.title}: the data do not determine {', '.join(open_constants)}.")
     # A sensor that reads in coarse steps makes curves, too.
-    if any(one.curve is not None for one in found) and any(one.coarse for one in readings(final)):
+    if any(effect.curve is not None for effect in added) and any(effect.coarse for effect in readings(final)):
         result.append("A sensor reads in coarse steps, and such errors make curves too.")
-    if found and not has_size(ratio) and not any(_predicts(one.ratio, held_out) for one in found):
+    if added and not has_size(ratio) and not any(_predicts(effect.ratio, held_out) for effect in added):
         result.append("Held-out data gain less than 2 %, and less than 10 nats.")
     return result
 
@@ -89,18 +89,18 @@ def _predicts(cost: Ratio, held_out: int) -> bool:
     return cost[2] < 1.0 and held_out * (1.0 / max(cost[0], 1e-300) - 1.0) / 2 >= EVIDENCE_MARGIN
 
 
-def undetermined(one: AddedEffect, final: Fit) -> list[str]:
+def undetermined(added: AddedEffect, final: Fit) -> list[str]:
     """Constants of an effect that are within three standard errors of zero.
 
     Amplitudes that stand together, as those of a sine and a cosine, count as one.
     """
     order = list(final.parameters)
     result = []
-    amplitudes = [p for p in one.effect.amplitudes if f"{one.effect.name}.{p}" in order]
-    groups = [amplitudes, *([p] for p in one.errors if p not in amplitudes)]
+    amplitudes = [p for p in added.effect.amplitudes if f"{added.effect.name}.{p}" in order]
+    groups = [amplitudes, *([p] for p in added.errors if p not in amplitudes)]
     for group in filter(None, groups):
-        rows = [order.index(f"{one.effect.name}.{p}") for p in group]
-        values = np.array([one.parameters[p] for p in group])
+        rows = [order.index(f"{added.effect.name}.{p}") for p in group]
+        values = np.array([added.parameters[p] for p in group])
         block = final.covariance[np.ix_(rows, rows)]
         if np.linalg.matrix_rank(block) < len(rows) or (
             values @ np.linalg.solve(block, values) < _DETERMINED**2

@@ -112,7 +112,7 @@ class Reading(OneLine):
         return self.step > _COARSE * self.noise
 
     @property
-    def told(self) -> float:
+    def frame_noise(self) -> float:
         """Noise of a single frame."""
         return self.noise if self.trusted else self.shown
 
@@ -121,7 +121,7 @@ class Reading(OneLine):
         """Description in mm and mrad, as errors are reported."""
         unit, factor = small_unit(self.unit)
         unit = f" {unit}" if unit else ""
-        text = f"{self.name} {factor * self.told:.3g}{unit}"
+        text = f"{self.name} {factor * self.frame_noise:.3g}{unit}"
         if not self.trusted:
             counted = f"{factor * self.noise:.3g}{unit}, because the geometry of a film is no more accurate"
             text += f" (counted as {counted})"

@@ -430,7 +430,7 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
     order = list(problem.models[0].parameters)
     names = [f"{e.name}.{p}" for e in effects for p in e.amplitudes]
     line = 0.5 / float(np.ptp(fitted.record.t))
-    more = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
+    new_free = tuple(Free(name, "model", order.index(name), 0.0, np.inf) for name in names)
     optimised = [(e, p) for e in effects for p in e.spec.parameters if p.sought]
     waves = [(f"{e.name}.{p.name}", e.parameters[p.name]) for e, p in optimised if p.role == "frequency"]
     shapes = [
@@ -438,14 +438,14 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
         for e, p in optimised
         if p.role in ("shape", "scanned")
     ]
-    more += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
-    problem = replace(problem, free=problem.free + more)
+    new_free += tuple(Free(name, "model", order.index(name), f, line) for name, f in waves)
+    problem = replace(problem, free=problem.free + new_free)
     first = replace(goal, chi2=np.inf) if shapes else goal  # chi2 falls once the shapes are free
     first_fit = reduce_model_error(fitted.measurements, problem, point, problem.schedule[1:], goal=first)
     if not shapes:
         return first_fit
-    more = tuple(Free(name, "model", order.index(name), value, sd) for name, value, sd in shapes)
-    problem = replace(problem, free=problem.free + more)
+    new_free = tuple(Free(name, "model", order.index(name), value, sd) for name, value, sd in shapes)
+    problem = replace(problem, free=problem.free + new_free)
     # With a small model error, a shape and its amplitude move slowly: the fit stopped 100 in chi2 too high.
     return reduce_model_error(fitted.measurements, problem, first_fit.point, problem.schedule[1:], goal=goal)
 

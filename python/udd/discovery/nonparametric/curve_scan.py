@@ -94,7 +94,7 @@ class Curve(OneLine):
         return (self.slot.title, *(c.name for c in self.coordinates))
 
     @property
-    def kin(self) -> tuple[str, ...]:
+    def key_without_momentum(self) -> tuple[str, ...]:
         """Slot and coordinates, without the momentum, for comparison."""
         return _key(self.slot, self.coordinates)
 
@@ -203,7 +203,7 @@ def scan_curves(
     # close to the best is the second tried.
     first = [(slot, coords) for slot, coords in groups if slot.momentum != "consistent"]
     curves = sorted(_score(moved, first), key=lambda c: -c.evidence)
-    best_keys = {c.kin for c in curves[:_FEW]}
+    best_keys = {c.key_without_momentum for c in curves[:_FEW]}
     second = [
         (slot, coords)
         for slot, coords in groups

@@ -30,24 +30,24 @@ def camera_shows(base: Fit, extended: Fit) -> list[str] | None:
         Names of the effects that are not needed once the camera's parameters are free: the camera then
         explains the data better than they did. Empty if that is only possible, as with a formula.
     """
-    more = _fixed(base)
+    camera_parameters = _fixed(base)
     there = {e.name for e in base.model.effects}
     effects = [e for e in extended.model.effects if e.name not in there]
-    if not more or not effects:
+    if not camera_parameters or not effects:
         return None
     names = [e.name for e in effects]
-    camera_alone = _freed(with_noise_of(base, extended), more)
+    camera_alone = _freed(with_noise_of(base, extended), camera_parameters)
     for kept in (some for size in range(len(names)) for some in itertools.combinations(names, size)):
         if camera_alone is not None and _explains(camera_alone, extended, kept):
             return [name for name in names if name not in kept]
     if any(e.made for e in effects):  # a formula may imitate the camera's errors
         return []
-    freed = _freed(extended, more)
+    freed = _freed(extended, camera_parameters)
     if freed is None:
         return None
     before, after = same_level(extended, freed)
     fall = (before.chi2 - after.chi2) / after.inflation(before)
-    shows = after.chi2 < _MOST * before.chi2 and chi_squared.sf(fall, len(more)) < ALPHA
+    shows = after.chi2 < _MOST * before.chi2 and chi_squared.sf(fall, len(camera_parameters)) < ALPHA
     return [] if shows else None
 
 
