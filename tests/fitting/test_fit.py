@@ -13,11 +13,11 @@ from scipy.optimize import least_squares
 import simulated
 import udd
 from udd.errors import FitError
-from udd.fitting import as_stated, fit_record, model_error_schedule, record_of, widened
+from udd.fitting import as_stated, eased, fit_record, model_error_schedule, record_of, widened
 from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.fit import _afresh
 from udd.fitting.parameters import Free
-from udd.fitting.solve import solve
+from udd.fitting.solve import SolveError, solve
 
 
 @pytest.fixture(scope="module")
@@ -276,3 +276,17 @@ def test_what_a_solve_left_counts_only_where_it_was_left():
         ends = [solve((measured,), problem, replace(p, sets=sets), 1) for p in (left, bare)]
         assert ends[0].chi2 == ends[1].chi2
         assert ends[0].parameters == ends[1].parameters
+
+
+def test_a_looser_fit_whose_shape_leaves_its_range_is_no_candidate(monkeypatch):
+    """Stribeck's fade ran below its range on the way, and the search ended with an error."""
+    t = np.arange(0, 10, 0.05)
+    theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 0.5]).state[:, 1]
+    noise = 2e-3 * np.random.default_rng(3).standard_normal(len(t))
+    tight = udd.fit(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.05))
+
+    def leaves(*_args, **_options):
+        raise SolveError("the fit reached parameters that are invalid for the model")
+
+    monkeypatch.setattr(model_error_schedule, "solve", leaves)
+    assert eased(tight).parameters == tight.parameters

@@ -14,7 +14,7 @@ from .model_error_levels import negligible_levels
 from .noise import estimated, noise_autocorrelation
 from .problem import Fit, Point, Problem
 from .record import Record
-from .solve import DONE, done, solve
+from .solve import DONE, SolveError, done, solve
 
 #: Maximum of steps at one level: a right model takes three to seven, or more if its law has kinks.
 STEPS = 30
@@ -183,11 +183,17 @@ def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -
 def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     """Increase the model error again, level by level, if that is more probable.
 
-    Levels as probable as the smallest one may lie between it and a more probable one.
+    Levels as probable as the smallest one may lie between it and a more probable one. A level at which a
+    parameter leaves its range is the end.
     """
     best, point = fitted, fitted.point
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
-        looser = solve(fitted.measurements, fitted.problem.with_model_error(diffusion), point, decrease=ROUGH)
+        problem = fitted.problem.with_model_error(diffusion)
+        try:
+            looser = solve(fitted.measurements, problem, point, decrease=ROUGH)
+        except SolveError:
+            # Without this Stribeck's friction on a shaken support ends a search with an error.
+            break
         if looser.evidence < best.evidence - LESS:
             break
         point = looser.point
