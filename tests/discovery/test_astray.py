@@ -183,7 +183,7 @@ def test_fits_of_a_narrow_bump_show_its_momentum(momentum: str) -> None:
     measured = filmed(udd.Disk(0.03, effects=[bump(momentum)]), 30.0)
     base = fit_record(measured, record_of(measured), udd.Disk(0.03), search=True)
     curves = score_round(base).curves
-    both = [curve for curve in curves if curve.kin == curves[0].kin]
+    both = [curve for curve in curves if curve.key_without_momentum == curves[0].key_without_momentum]
     right, wrong = sorted(both, key=lambda curve: curve.slot.momentum != momentum)
     fits = [fit_curve(base, curve).fit for curve in (right, wrong)]
     assert right.name == (f"lateral ({momentum})", "Y") and fits[0].level == fits[1].level

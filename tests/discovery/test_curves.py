@@ -53,8 +53,8 @@ def test_a_law_of_no_library_is_located_and_described(case):
     assert described.identified
     # Some formula within the ten nats is the law, as closely as the curve is known where the data are.
     x = np.quantile(curve.places[0], np.linspace(0.05, 0.95, 60))
-    law = curve.beside(SHARE * case.curve(x), x)
-    off = [(curve.beside(f.values(x), x) - law) / curve.errors(x) for f in described.formulas]
+    law = curve.aligned_with(SHARE * case.curve(x), x)
+    off = [(curve.aligned_with(f.values(x), x) - law) / curve.errors(x) for f in described.formulas]
     assert min(np.sqrt(np.mean(z**2)) for z in off) < 2
 
 
@@ -154,7 +154,7 @@ def test_bands_hold_the_law(case, records):
         places = curve.places[0]
         places = np.mod(places, 2 * np.pi) if curve.splines[0].periodic else places
         x = np.quantile(places, np.linspace(0.005, 0.995, 199))
-        off = curve.values(x) - curve.beside(0.4 * case.curve(x), x)
+        off = curve.values(x) - curve.aligned_with(0.4 * case.curve(x), x)
         inside.append(np.mean(np.abs(off) < 1.96 * curve.errors(x)))
     assert np.mean(inside) > (0.8 if "bump" in case.name else 0.9)
 
@@ -341,7 +341,7 @@ def test_what_parameters_absorb_is_left_out(null):
     narrowed = identifiable_part(curve, null)
     x = np.quantile(curve.places[0], np.linspace(0.05, 0.95, 40))
     assert narrowed.errors(x).mean() < 0.5 * curve.errors(x).mean()
-    taken_back = narrowed.beside(narrowed.values(x) + 1e-3, x) - narrowed.values(x)
+    taken_back = narrowed.aligned_with(narrowed.values(x) + 1e-3, x) - narrowed.values(x)
     assert np.abs(taken_back).mean() < 4e-4
 
 
@@ -448,7 +448,7 @@ def test_a_located_curve_is_fitted_in_full():
     assert result.fit.scatter < 1.1 * plain.scatter
     assert 5 < result.curve.df < 20
     x = np.quantile(result.curve.places[0], np.linspace(0.01, 0.99, 99))
-    off = result.curve.values(x) - result.curve.beside(case.curve(x), x)
+    off = result.curve.values(x) - result.curve.aligned_with(case.curve(x), x)
     assert np.mean(np.abs(off) < 1.96 * result.curve.errors(x)) > 0.8
     # The effect is the curve.
     made = result.fit.model.rates(0.0, np.column_stack([0 * x, 0 * x, x, 0 * x]))[:, 2] - result.fit.model.W
@@ -506,7 +506,7 @@ def test_one_law_takes_the_place_of_several_that_come_near_it():
     assert effect.curve.name == ("torque", "theta")
     theta = np.arange(-3, 3.1, 0.25)
     curve = effect.curve
-    off = (curve.values(theta) - curve.beside(push(theta), theta)) / curve.errors(theta)
+    off = (curve.values(theta) - curve.aligned_with(push(theta), theta)) / curve.errors(theta)
     assert np.sqrt(np.mean(off**2)) < 2
     k = result.error_after.horizons.index(1.0)
     assert result.error_after.median[k] < 1.3 * result.error_after.floor[k]  # known to some 10 % each

@@ -257,7 +257,7 @@ def test_friction_over_the_time_alone_leaves_the_form_open(monkeypatch):
     settles = udd.effects.warming_friction(a=0.01, tau=30.0)
     numbers = final(warming_friction__a=(0.01, 0.001))
     (doubt,) = doubts_of([added(settles)], numbers, (0.5, 0.4, 0.6), 1000)
-    assert "the time stands for its size" in doubt
+    assert "effects of time and of amplitude are confounded" in doubt
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Which of several trials is accepted: the best form, if it passes all tests."""
+"""Acceptance of a trial: the best form, if it passes all tests."""
 
 from __future__ import annotations
 
@@ -34,37 +34,40 @@ from .thresholds import ALPHA, Confirmation
 from .time_budget import Clock
 from .trial_fits import TrialFit, fitted_ones, from_none, needed_in, of_curve, of_formula, of_library
 
-_WORSE = 1.1  # an effect is refused if the lower end of the errors' ratio exceeds this at some horizon
-_DRIFT = 0.7  # of an effect's gain from which on a drifting sensor, its motion held, may be all there is
+_WORSE = 1.1  # lower end of the errors' ratio at some horizon, above which an effect is rejected
+_DRIFT = 0.7  # share of an effect's gain above which a sensor's drift, with the motion fixed, may explain it
 _FORMULAS = 3  # for each curve, fitted in full
-_WIDE = 3  # times the margin, by which a form may be behind in the first part
-_ASTRAY = 1.5  # times the scatter of the first part, of all data: that fit may have ended elsewhere
-_BENT = 3.0  # times the least scatter, by which what is held as stated may part forms
-_COMPARED = 12  # forms between which all data decide
+_WIDE = 3  # times the margin by which a form may be behind in the training part
+# ratio of the scatter of all data to that of the training part, above which a fit may have ended elsewhere
+_MAX_SCATTER_RATIO = 1.5
+# While parameters are fixed, forms with a scatter within this factor of the least are compared with all
+# parameters free.
+_BIAS_SCATTER_RATIO = 3.0
+_COMPARED = 12  # maximum of forms that are compared on all data
 
 
 @dataclass(frozen=True)
 class Step:
-    """An addition that was accepted: one candidate, two together, or a curve.
+    """Accepted addition: one candidate, two together, or a curve.
 
     Attributes
     ----------
     candidates : list of Candidate
     curve : Curve or None
-        The curve that was located, where that is what was added or what a formula was found for.
+        The located curve, if it was added or has a formula.
     chi2, p : float
-        By how much chi2 fell, and the probability of that by chance.
+        Decrease in chi2, and the probability of that by chance.
     ratio : tuple of float
         Cost of the held-out frames after over before, with its 95 % interval.
     witness : {"held", "fitted", "halves"}
-        What bears it out, see :func:`udd.discovery.validation.confirmation.confirmed_by`.
+        Test that confirms it, see :func:`udd.discovery.validation.confirmation.confirmed_by`.
     alternatives : list of Alternative
     formula : Formula or None
-        What the curve is written as.
+        Formula of the curve.
     names : list of str
-        The parameters that came in with it.
+        Parameters that it adds.
     cost : float
-        What its log evidence pays, nats, for a spline's freedom and for its prior.
+        Cost in its log evidence, nats, of a spline's freedom and of its prior.
     """
 
     candidates: list[Candidate]
@@ -80,15 +83,15 @@ class Step:
 
     @property
     def is_curve(self) -> bool:
-        """Whether it is a curve without a formula."""
+        """True for a curve without a formula."""
         return self.curve is not None and self.candidates[0].title == self.curve.title
 
 
 @dataclass(frozen=True)
 class SearchState:
-    """Where the search stands: fits of the first part and of all data, and held-out errors.
+    """State of the search: fits of the training part and of all data, and held-out errors.
 
-    Where whole records are held out both are one fit, of all other records.
+    If whole records are held out both are one fit, of all other records.
     """
 
     part: Fit
@@ -96,36 +99,38 @@ class SearchState:
     errors: Errors
 
 
-def _beside(mine: Sequence[Candidate], others: Sequence[Candidate]) -> list[tuple[Candidate, Candidate]]:
-    """Which effects of one list stand in the place of which of another, those in both left out."""
-    left = [c for c in mine if c.effect not in [o.effect for o in others]]
-    right = [o for o in others if o.effect not in [c.effect for c in mine]]
-    return list(zip(left, right, strict=False))
+def _pair_differences(
+    effects: Sequence[Candidate], rival_effects: Sequence[Candidate]
+) -> list[tuple[Candidate, Candidate]]:
+    """Pair the effects in which two hypotheses differ."""
+    first_only = [c for c in effects if c.effect not in [o.effect for o in rival_effects]]
+    second_only = [o for o in rival_effects if o.effect not in [c.effect for c in effects]]
+    return list(zip(first_only, second_only, strict=False))
 
 
 def _chance(pair: Pair, trial: TrialFit, scores: ScoreRound) -> tuple[float, float]:
-    """By how much chi2 fell from one fit of all data to another, and the probability of that by chance."""
-    from scipy.stats import ncx2  # takes half a second to import
+    """Compute the decrease in chi2 between two fits of all data, and its probability by chance."""
+    from scipy.stats import ncx2  # half a second to import
 
     before, after = pair
     inflation = after.inflation(before)
     fall = (before.chi2 - after.chi2) / inflation
-    # What a film's faults make up is no sum of squares of chance alone.
+    # A film's faults add a non-central part to chi2.
     return fall, min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * scores.comparisons, 1.0)
 
 
 @dataclass(frozen=True)
 class TestResult:
-    """What the tests say of a trial.
+    """Results of the tests of a trial.
 
     Attributes
     ----------
     whole : Fit
-        Of all data.
+        Fit of all data.
     chi2, p, ratio, witness
-        As of a :class:`Step`; a trial that chance explains is not asked for a witness.
+        As in :class:`Step`; a trial that chance explains is not tested for confirmation.
     drifts : bool
-        Whether a slow drift of the sensor's zero would explain more.
+        True if a slow drift of the sensor's zero would explain more.
     """
 
     whole: Fit
@@ -137,7 +142,7 @@ class TestResult:
 
 
 def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
-    """A proposal fitted to all data, from where a fit of these without it ended."""
+    """Fit a proposal to all data, starting at the end of a fit of these without it."""
     if trial.curve is None:
         added = trial.fit.model.effects[-len(trial.candidates) :]
         shaped = [
@@ -151,7 +156,7 @@ def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
 
 
 class Acceptance:
-    """The tests that a trial must pass, and the choice between those that do."""
+    """Tests that a trial must pass, and the choice between those that do."""
 
     def __init__(
         self,
@@ -170,13 +175,14 @@ class Acceptance:
         return [f.name for f in self.free if f.role == "model"]
 
     def errors(self, fitted: Fit) -> Errors:
-        """Held-out errors of a fit of the first part."""
+        """Compute the held-out errors of a fit of the training part."""
         return held_out_errors(fitted, self.record, self.held_out, unit=self.unit)
 
     def improvement(self, before: Errors, after: Errors) -> Ratio:
-        """Held-out error after over before.
+        """Compute the ratio of held-out errors, after over before.
 
-        Of the disk, which is chaotic, at the horizon of comparison; of a pendulum over the whole run.
+        For the disk, which is chaotic, it is taken at the horizon of comparison; for a pendulum over the
+        whole run.
         """
         if before.unit == "rad":
             return whole_improvement(before, after)
@@ -185,10 +191,10 @@ class Acceptance:
     def best(
         self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
     ) -> tuple[Step, SearchState] | None:
-        """The likeliest hypothesis, if it passes all tests."""
+        """Return the most probable hypothesis, if it passes all tests."""
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         order = named(ranked(self.hypotheses(current, trials, scores)), self.known_parameters)
-        # Where the likeliest fails a test, a clearly less likely one is not named instead.
+        # If the most probable one fails a test, a clearly less probable one does not replace it.
         most = max((h.log_z for h in order), default=0.0)
         for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
             trial = self._in_other_widths(current, chosen.trial, scores.library)
@@ -213,7 +219,7 @@ class Acceptance:
         return None
 
     def log_evidence(self, fitted: Fit, steps: Sequence[Step]) -> float:
-        """Log evidence of a fit of all data to which steps led, with the priors of these."""
+        """Compute the log evidence of a fit of all data after these steps, with their priors."""
         names = [name for step in steps for name in step.names]
         cost = sum(step.cost for step in steps)
         return log_evidence(self._at_own_noise(fitted), names) - cost
@@ -221,7 +227,7 @@ class Acceptance:
     def hypotheses(
         self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
     ) -> list[Hypothesis]:
-        """The likeliest proposals, each fitted to all data at its own noise and model error."""
+        """Return the most probable proposals, each fitted to all data at its own noise and model error."""
         terms = len(scores.library.scored) + len(scores.curves)
 
         def first(trial: TrialFit) -> float:
@@ -235,10 +241,11 @@ class Acceptance:
             most = max(evidence, default=0.0) - _WIDE * EVIDENCE_MARGIN
             likely = sorted(zip(evidence, trials, strict=True), key=lambda pair: -pair[0])
             leading = [trial for z, trial in likely if z > most]
-        else:  # what is held as stated bends forms: only with it free, and all data, do they compare
+        else:  # fixed parameters distort forms: compare them with all parameters free, and on all data
             least = min((t.fit.scatter for t in trials), default=0.0)
             leading = sorted(
-                (t for t in trials if t.fit.scatter < _BENT * least), key=lambda t: t.fit.scatter
+                (t for t in trials if t.fit.scatter < _BIAS_SCATTER_RATIO * least),
+                key=lambda t: t.fit.scatter,
             )
         likeliest = {id(trial) for trial in leading[:_COMPARED]}
         leading = [trial for trial in trials if id(trial) in likeliest]
@@ -260,14 +267,14 @@ class Acceptance:
         return result + wholes(self._shortened(current, ranked(result)))
 
     def _at_own_noise(self, fitted: Fit) -> Fit:
-        """A fit at its own noise and model error, with all free that the user leaves free."""
+        """Refit at the fit's own noise and model error, with all the user's free parameters."""
         return refit(self._all_free(fitted), trusted=True)
 
     def _written(self, current: SearchState, order: Sequence[Hypothesis]) -> list[TrialFit]:
-        """Formulas for the likely splines, as all data show them.
+        """Return formulas for the likely splines, as fitted to all data.
 
-        A velocity with its momentum and without is tried by each other's formulas too: as splines they look
-        nearly the same, and a formula may be found for one of them only.
+        A velocity with and without its momentum also tries the formulas of the other: as splines they are
+        almost identical, and a formula may be found for only one of them.
         """
         least = order[0].log_z - 2 * EVIDENCE_MARGIN if order else 0.0
         curves = [h.again.curve for h in order if h.trial.is_curve and h.log_z > least and h.again.curve]
@@ -282,7 +289,7 @@ class Acceptance:
         return fitted_ones(self.clock.each(lambda pair: of_formula(current.part, *pair), some))
 
     def _shortened(self, current: SearchState, order: Sequence[Hypothesis]) -> list[TrialFit]:
-        """The likeliest formula without each of its amplitudes that the data do not need."""
+        """Return the most probable formula without each of its needless amplitudes."""
         best = order[0].again if order else None
         if best is None or best.curve is None or best.formula is None:
             return []
@@ -294,58 +301,60 @@ class Acceptance:
         taken, number = fitted.model.state_names, fitted.observations
         formulas = formulas_for(curve, number, taken=taken).formulas[:_FORMULAS]
         name = curve.coordinates[0].name
-        # The library has the speed's.
+        # The library has powers of the speed.
         if len(curve.coordinates) > 1 or name in (curve.slot.equation, f"|{curve.slot.equation}|"):
             return formulas
         power = power_for(curve, number, taken)
         return [*formulas, power] if power is not None else formulas
 
     def _in_other_widths(self, current: SearchState, trial: TrialFit, scanned: Scan) -> TrialFit:
-        """Several effects at once, with every width of those that turn over one: a fit may be stuck at it.
+        """Fit several effects at once with all widths of smoothed signs: a fit may be stuck at one width.
 
-        Around a model that lacks two of them the width that scores best need not be near that of the fit.
+        Around a model that lacks two effects, the width with the best score may be far from the fitted one.
         """
         if len(trial.candidates) < 2:
             return trial
         groups = [
-            [other if c is mine else c for c in trial.candidates]
-            for mine in trial.candidates
+            [other if c is replaced else c for c in trial.candidates]
+            for replaced in trial.candidates
             for other in (s.candidate for s in scanned.scored)
-            if other.title == mine.title and other is not mine
+            if other.title == replaced.title and other is not replaced
         ]
-        found = fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
+        refitted = fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
         level = trial.fit.level
-        some = [trial, *(t for t in found if t.fit.level >= level and t.needed)]
+        some = [trial, *(t for t in refitted if t.fit.level >= level and t.needed)]
 
-        def chi2(one: TrialFit) -> float:  # held as tightly as the others
+        def chi2(other_trial: TrialFit) -> float:  # at the same model error
             try:
-                return at_level(one.fit, level).chi2
+                return at_level(other_trial.fit, level).chi2
             except FitError:
                 return math.inf
 
         return min(some, key=chi2)
 
     def all_are_free(self, fitted: Fit) -> bool:
-        """Whether everything is free that the user leaves free, as where a search begins it may not be."""
+        """Return True if all of the user's free parameters are free; at a search's start some may not be."""
         names = set(fitted.parameters)
         return all(f.name in names for f in self.free)
 
     def _all_free(self, fitted: Fit) -> Fit:
-        """With everything free that the user leaves free, where that does not go astray.
+        """Refit with all of the user's free parameters, unless that diverges.
 
-        A drive that is held 0.1 % off bends forms more than they differ.
+        A drive that is fixed 0.1 % off distorts forms more than they differ.
         """
-        # Without this a slip in the constraint alone is taken for a consistent one with a radial friction.
+        # Without this a slip in the constraint alone is mistaken for a consistent one with radial friction.
         if self.all_are_free(fitted):
             return fitted
         try:
-            found = released_anew(fitted, self.free)
+            result = released_anew(fitted, self.free)
         except FitError:
             return fitted
-        return found if found.converged and found.level >= fitted.level and not ran_away(found) else fitted
+        return (
+            result if result.converged and result.level >= fitted.level and not ran_away(result) else fitted
+        )
 
     def judged(self, current: SearchState, trial: TrialFit, scores: ScoreRound) -> TestResult | None:
-        """What the tests say of a trial; None where it cannot be fitted to all data."""
+        """Run the tests of a trial; None if it cannot be fitted to all data."""
         try:
             whole = self._again(current, trial)
             if whole is None:
@@ -364,30 +373,35 @@ class Acceptance:
         return TestResult(whole.fit, fall, p, ratio, witness, drifts)
 
     def errors_or_none(self, fitted: Fit) -> Errors | None:
-        """None where the model cannot be run over the held-out frames."""
+        """Compute the held-out errors; None if the model cannot be run over the held-out frames."""
         try:
             return self.errors(fitted)
         except FitError:
             return None
 
     def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
-        """The same proposal fitted to all data."""
+        """Fit the same proposal to all data."""
         if current.whole is current.part:
             return trial
-        # All data take the known model farther astray than the first part, and phases may be turns off.
+        # With all data the known model diverges further than in the training part, and phases may be off by
+        # turns.
         starts = [current.whole, started_at(current.whole, trial.fit, ~self.held_out)]
         if far_off(current.whole):
             starts.reverse()
         refits = []
         for start in starts:
-            one = _fitted_to(start, trial)
-            if one and one.fit.level >= trial.fit.level and one.fit.scatter < _ASTRAY * trial.fit.scatter:
-                return one
-            refits.append(one)
+            trial_again = _fitted_to(start, trial)
+            if (
+                trial_again
+                and trial_again.fit.level >= trial.fit.level
+                and trial_again.fit.scatter < _MAX_SCATTER_RATIO * trial.fit.scatter
+            ):
+                return trial_again
+            refits.append(trial_again)
         return min(fitted_ones(refits), key=lambda t: t.rank, default=None)
 
     def worse(self, before: Errors, after: Errors) -> bool:
-        """Whether a chaotic model's forecasts get worse beyond doubt at some horizon."""
+        """Return True if a chaotic model's forecasts get significantly worse at some horizon."""
         return before.unit != "rad" and any(
             improvement(before, after, h)[1] > _WORSE for h in before.horizons
         )
@@ -398,20 +412,22 @@ class Acceptance:
         listed = [s.candidate for s in scanned.scored]
         result: dict[tuple[str, str, str | None], Alternative] = {}
         for other in rivals(chosen, order, self.known_parameters):
-            for mine, theirs in _beside(chosen.trial.candidates, other.trial.candidates):
-                if theirs.title == mine.title:
-                    continue  # but for the width that its sign is smoothed over
-                known = mine in listed and theirs in listed
-                likeness = scanned.likeness(listed.index(mine), listed.index(theirs)) if known else 0.0
+            for chosen_form, theirs in _pair_differences(chosen.trial.candidates, other.trial.candidates):
+                if theirs.title == chosen_form.title:
+                    continue  # the same except for the width of its smoothed sign
+                is_scored = chosen_form in listed and theirs in listed
+                likeness = (
+                    scanned.likeness(listed.index(chosen_form), listed.index(theirs)) if is_scored else 0.0
+                )
                 named = {p: f"{theirs.effect.name}.{p}" for p in theirs.effect.parameters}
                 fitted = other.again.fit.parameters
                 effect = theirs.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
                 nats = chosen.log_z - other.log_z
                 alternative = Alternative(
-                    mine.effect.name, effect, theirs.title, theirs.effect.equation, nats, likeness
+                    chosen_form.effect.name, effect, theirs.title, theirs.effect.equation, nats, likeness
                 )
-                # The same may stand beside several partners; the best is told.
-                key = (mine.effect.name, theirs.title, theirs.effect.momentum)
+                # An effect may have several partners; the best is listed.
+                key = (chosen_form.effect.name, theirs.title, theirs.effect.momentum)
                 if key not in result or nats < result[key].nats:
                     result[key] = alternative
         return list(result.values())

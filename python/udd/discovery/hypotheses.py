@@ -23,13 +23,13 @@ from .trial_fits import TrialFit
 
 Array = NDArray[np.float64]
 
-_SYMBOL = math.log(12)  # nats: a formula's symbol is one of so many operations and functions
-_PLACES = 400  # of a motion, at which laws are compared
-_EQUAL = 1e-2  # of a law's size: two that differ by less are one
+_SYMBOL = math.log(12)  # nats: a formula's symbol is one of 12 operations and functions
+_PLACES = 400  # places of a motion at which laws are compared
+_EQUAL = 1e-2  # relative difference below which two laws are equal
 
 
 def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
-    """Laplace approximation of the log evidence, with unit-information priors.
+    """Compute the log evidence by Laplace's approximation, with unit-information priors.
 
     The states are integrated out, and so are the parameters. A parameter without a prior of its own gets one
     that carries as much information as one number of the record does (Kass and Wasserman 1995).
@@ -38,7 +38,7 @@ def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
     ----------
     fitted : Fit
     names : sequence of str
-        The parameters without a prior of their own that the hypothesis adds to the known model.
+        Parameters that the hypothesis adds to the known model, without an explicit prior.
     """
     if not names:
         return fitted.evidence
@@ -52,22 +52,22 @@ def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
 
 
 def spent(trial: TrialFit) -> float:
-    """Nats that the freedom of a spline costs, whose coefficients a fit holds."""
+    """Return the cost of a spline's freedom in nats; its coefficients are fixed in a fit."""
     return trial.price / 2 if trial.is_curve else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A law or several, fitted to the first part of a record and to all of it.
+    """One or several laws, fitted to the training part of a record and to all of it.
 
     Attributes
     ----------
     trial, again : TrialFit
-        What was proposed, fitted to the first part and to all data.
+        The proposal, fitted to the training part and to all data.
     whole : Fit
-        Of all data, at its own most probable noise and model error.
+        Fit of all data at its own most probable noise and model error.
     prior : float
-        Logarithm of its prior probability: that of one term among all, or of a formula of its length.
+        Log prior probability: that of one term among all, or of a formula of its length.
     """
 
     trial: TrialFit
@@ -77,10 +77,10 @@ class Hypothesis:
 
     @cached_property
     def log_z(self) -> float:
-        """Log evidence of all data, less what a curve's freedom costs, with the prior.
+        """Log evidence of all data, minus the cost of a curve's freedom, plus the log prior.
 
-        The geometry of a film is not sure to the noise that shows. A curve, a formula and a number that a
-        scan chose pay in units of what a film's geometry is taken to be at least; plain laws do not.
+        The geometry of a film is less accurate than its noise suggests. A curve, a formula and a scanned
+        number pay in units of the geometry's assumed error; plain laws do not.
         """
         fitted = self.again.fit
         # Without this the quadratic drag of a real pendulum's film becomes a curve or a power.
@@ -91,16 +91,16 @@ class Hypothesis:
 
     @property
     def constants(self) -> int:
-        """How many numbers were found for it."""
+        """Count of estimated numbers."""
         return max(len(self.trial.names), sum(c.parameters for c in self.trial.candidates))
 
 
 def log_prior(trial: TrialFit, terms: int) -> float:
-    """Logarithm of a proposal's prior probability, where the library has so many terms.
+    """Compute a proposal's log prior probability, for a library with so many terms.
 
-    A term of the library is one of these. A formula costs the nats that it takes to write it down, and its
-    coordinate. A spline says less than a law: it leads if it is far better. A term
-    that machines hardly have, and friction that changes with the time alone, must be five nats better.
+    A term of the library is one of these. A formula costs its description length in nats, and its coordinate.
+    A spline says less than a law and must be far better to lead. A term that machines hardly have, and
+    friction that changes with time alone, must be five nats better.
     """
     single = -math.log(terms)
     unusual = EVIDENCE_MARGIN / 2 * sum(not c.usual or brakes_with_time(c.effect) for c in trial.candidates)
@@ -110,7 +110,7 @@ def log_prior(trial: TrialFit, terms: int) -> float:
 
 
 def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]) -> bool:
-    """Return True if one law can do what another one does, along the motion that was fitted with it.
+    """Return True if one law can imitate another one, along the motion that was fitted with the other.
 
     The law's constants are fitted to the other one's rates by least squares. What the parameters of the known
     model can do is left out.
@@ -131,12 +131,12 @@ def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]
     able = by_parameter(plain, [name for name in known_parameters if name in plain.parameters], t, states)
     basis = np.linalg.qr(able)[0]
 
-    def left(rates: Array) -> Array:
+    def unabsorbed(rates: Array) -> Array:
         work = (rates - without).ravel()
         result: Array = work - basis @ (basis.T @ work)
         return result
 
-    target = left(model.rates(t, states))
+    target = unabsorbed(model.rates(t, states))
     size = float(np.linalg.norm(target))
     effects = law.whole.model.effects[len(law.whole.model.effects) - len(law.trial.candidates) :]
     start = {f"{e.name}.{p}": e.parameters[p] for e in effects for p in e.parameters}
@@ -149,7 +149,7 @@ def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]
     def residual(x: Array) -> Array:
         try:
             tried = base.with_parameters(dict(zip(varied, (x * scale).tolist(), strict=True)))
-            off = (left(tried.rates(t, states)) - target) / size
+            off = (unabsorbed(tried.rates(t, states)) - target) / size
         except ModelError:
             return np.full(target.shape, 1e3)
         return np.where(np.isfinite(off), off, 1e3)
@@ -165,7 +165,7 @@ def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]
 
 
 def _starts(effects: Sequence[Effect], values: Mapping[str, float], varied: Sequence[str]) -> Iterator[Array]:
-    """The fitted constants, and the same with each shape at the ends of its range.
+    """Yield the fitted constants, and the same with each shape at the ends of its range.
 
     A law may become another one only there, as Stribeck's friction becomes dry friction.
     """
@@ -179,17 +179,17 @@ def _starts(effects: Sequence[Effect], values: Mapping[str, float], varied: Sequ
 
 
 def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses in order of their log evidence, the best first.
+    """Sort hypotheses by their log evidence, the best first.
 
-    Those that are behind by the same number of nats tie: they keep the order that they came in, as a slip and
-    a relaxation do, which are one and the same at one drive.
+    Those that are behind by the same number of nats tie and keep their order, as a slip and a relaxation do,
+    which are identical at one drive.
     """
     most = max((h.log_z for h in hypotheses), default=0.0)
     return sorted(hypotheses, key=lambda h: round(most - h.log_z))
 
 
 def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[Hypothesis]:
-    """The hypotheses in order, but first the library's law if it says the same as the formula that leads.
+    """Sort hypotheses, but put the library's law first if it is equivalent to the leading formula.
 
     Parameters
     ----------
@@ -202,8 +202,8 @@ def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[
         return list(order)
     first = order[0]
     for other in order[1:]:
-        near = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
-        if near and other.constants <= first.constants and contains(other, first, known_parameters):
+        is_close = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
+        if is_close and other.constants <= first.constants and contains(other, first, known_parameters):
             return [other, *(h for h in order if h is not other)]
     return list(order)
 
@@ -211,10 +211,10 @@ def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[
 def rivals(
     chosen: Hypothesis, others: Sequence[Hypothesis], known_parameters: Sequence[str]
 ) -> list[Hypothesis]:
-    """The hypotheses that the data cannot tell from the chosen one.
+    """Return the hypotheses that the data cannot distinguish from the chosen one.
 
-    Those within ten nats of it, but no spline beside a law, nothing that the chosen one contains, and
-    nothing that contains the chosen one with more constants and does not gain by them.
+    They are within ten nats of it. Excluded are splines if a law was chosen, laws that the chosen one
+    contains, and laws that contain it with more constants and no gain.
     """
     result = []
     for other in others:
@@ -228,6 +228,6 @@ def rivals(
         if wider and other.log_z <= chosen.log_z and contains(other, chosen, known_parameters):
             continue
         if not wider and other.trial.formula is not None and contains(chosen, other, known_parameters):
-            continue  # the chosen law in other words
+            continue  # the chosen law in another form
         result.append(other)
     return result

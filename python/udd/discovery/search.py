@@ -32,25 +32,25 @@ from .thresholds import ALPHA, RejectionReason
 from .time_budget import TimeUpError
 from .trial_fits import fitted_ones, needed_in, of_library
 
-_NEAREST = 4  # of them where none passes, to tell what they would do
-_MOST = 3  # effects added
-_CURVES = 2  # of the likeliest, located
-_LIKELY = 0.5  # of the evidence for the likeliest, which they have at least
+_NEAREST = 4  # closest candidates to report if none passes
+_MOST = 3  # maximum of added effects
+_CURVES = 2  # most probable curves that are located
+_LIKELY = 0.5  # minimum evidence of these, as a share of the highest
 
 
 def map_fits(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
-    """The same done to the fits of the first part and of all data, once where they are one."""
+    """Apply `work` to the training fit and the full-data fit; once if they are identical."""
     if part is whole:
         return (work(part),) * 2
-    one, other = parallel_map(work, (part, whole))
-    return one, other
+    training, full = parallel_map(work, (part, whole))
+    return training, full
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where a search ended: fits of the first part and of all data, errors, what was seen and done.
+    """Result of the search: training and full-data fits, held-out errors, accepted steps, score rounds.
 
-    `stopped` is what it was at when its time was up.
+    `stopped` is the activity at which the time was up.
     """
 
     part: Fit
@@ -63,14 +63,14 @@ class Outcome:
 
 
 class Search:
-    """The search on the first part of a record, tested on the rest."""
+    """Search on the training part of a record, tested on the rest."""
 
     def __init__(self, tests: Acceptance, given: Sequence[Candidate] = ()) -> None:
         self.tests, self.given = tests, given
         self.clock, self.tell = tests.clock, tests.clock.tell
 
     def run(self, begin: SearchState, known_model: SearchState | None = None) -> Outcome:
-        """Add effects to the first state until none passes; `known_model` has the fits of the known model."""
+        """Add effects until none passes, starting at `begin`; `known_model` has the known model's fits."""
         accepted: list[Step] = []
         rounds: list[ScoreRound] = []
         states = [begin]
@@ -93,9 +93,9 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
             rounds.append(scores)
-            # What the library has been asked for already, or what is strong, and what a curve still says far
-            # more of than anything in it, is no bent view of something known. Of a machine it may be: its
-            # library holds most of what machines have.
+            # A curve that clearly beats every library term cannot be a biased view of one if the library was
+            # tried before or the effect is strong. For a machine it can, because its library has most terms
+            # of machines.
             chaotic = states[-1].part.model.profile.discovery.chaotic
             first = scores.curve_leads() and (accepted or scores.off_track or chaotic)
             tried = scores.passing_curves() if first else []
@@ -112,27 +112,27 @@ class Search:
             self._backward_elimination(accepted, states, rounds)
             bent, states[-1] = states[-1], self._released(states[-1])
             if states[-1] is not bent and accepted[-1].is_curve:
-                # What was held had bent it, which hides its formula.
+                # Fixed parameters biased the curve and hid its formula; relocate it with all parameters free.
                 self._relocated(len(accepted) - 1, accepted, states, rounds)
-            # What takes another's place may give way to it again: then the search goes in circles.
+            # An effect may replace another and be replaced by it again: then the search is circular.
             titles = tuple(c.title for step in accepted for c in step.candidates)
             if titles in seen_titles:
                 break
             seen_titles.add(titles)
-            # What no library has, and free runs contradict, is no ground to search on from.
+            # A curve that free runs contradict is no basis for a further search.
             contradicted = self.tests.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
             if accepted[-1].curve is not None and contradicted:
                 break
 
     def _confirmed_by_free_runs(self, known_model: SearchState, states: list[SearchState]) -> int:
-        """How many of the steps free runs on the held-out data confirm."""
+        """Count the steps that free runs on the held-out data confirm."""
         for number in range(len(states) - 1, 0, -1):
             errors = states[number].errors
             one_more = self.tests.improvement(states[number - 1].errors, errors)
             ratio = self.tests.improvement(known_model.errors, errors)
             if not confirmed(known_model.errors, ratio) or one_more[1] > 1.0:
                 continue
-            # Runs that are too short to show it do not confirm what forces at random do as well.
+            # Runs that are too short to show an effect do not confirm it if random forces explain as much.
             if ratio[2] < 1.0 or as_random(known_model.whole, states[number].whole) is None:
                 return number
         return 0
@@ -140,7 +140,7 @@ class Search:
     def _unconfirmed(
         self, known_model: SearchState, steps: list[Step], end: SearchState
     ) -> list[RejectedEffect]:
-        """What passed all other tests."""
+        """List effects that passed all other tests."""
         ratio = self.tests.improvement(known_model.errors, end.errors)
         return [
             RejectedEffect(
@@ -156,15 +156,14 @@ class Search:
             for c in step.candidates
         ]
 
-    def _released(self, state: SearchState, anew: bool = False) -> SearchState:
-        """With everything free that the user leaves free, unless that goes astray.
+    def _released(self, state: SearchState, reestimate_noise: bool = False) -> SearchState:
+        """Refit with all of the user's free parameters, unless that diverges.
 
-        Where all is free already it stays as it is, unless the noise is to be estimated `anew`. A camera may
-        well be farther off than is usual: held-out data that are foretold better beyond doubt with what it
-        came to say that it is.
+        If all are free already the state stays, unless `reestimate_noise`. A camera may be farther off than
+        usual: significantly better predictions of held-out data confirm its fitted parameters.
         """
-        # Without this a strong cubic drag is followed by an eccentric mass and a curve that are not there.
-        if self.tests.all_are_free(state.part) and not anew:
+        # Without this a spurious eccentric mass and a spurious curve follow a strong cubic drag.
+        if self.tests.all_are_free(state.part) and not reestimate_noise:
             return state
         try:
             part, whole = map_fits(partial(released_anew, free=self.tests.free), state.part, state.whole)
@@ -181,10 +180,10 @@ class Search:
     def rejected(
         self, base: SearchState, scores: ScoreRound, numbers: Sequence[int] = (0,)
     ) -> list[RejectedEffect]:
-        """What comes nearest where nothing passes: the strongest of the library, by their held-out errors.
+        """Return the closest effects if nothing passes: the library's strongest, by held-out errors.
 
-        Of several records, by `numbers`, first of all what only some of them want: the form that explains
-        these best where each has its own amplitude.
+        With several records, named by `numbers`, the first is an effect that only some of them support: the
+        form that explains these best with separate amplitudes.
         """
         strongest: dict[object, Scored] = {}
         for scored in scores.usable():
@@ -221,7 +220,7 @@ class Search:
         return [replace(best, why="records"), *(r for r in near_misses if r is not best)]
 
     def _library_step(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
-        """The best addition of the library that passes: an effect, or two of them together."""
+        """Return the best passing addition from the library: one effect, or two together."""
         proposals = Proposals(current.part, scores, self.clock)
         trials, loose = proposals.effects()
         if single := self.tests.best(current, trials, scores):
@@ -232,14 +231,14 @@ class Search:
     def _located(
         self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
     ) -> tuple[Step, SearchState] | None:
-        """The best curve or surface that passes; of some those that would have been chosen were tried."""
+        """Return the best passing curve or surface; those already chosen from `tried` are skipped."""
 
         def best(curves: Sequence[Curve]) -> list[Curve]:
             most = max((c.evidence for c in curves), default=0.0)
             one_each: dict[tuple[str, ...], list[Curve]] = {}
             for curve in states_first([c for c in curves if c.evidence > _LIKELY * most]):
                 one_each.setdefault(curve.key_without_momentum, []).append(curve)
-            # A velocity with its momentum and without: which of them it is a full fit says.
+            # A full fit decides between a velocity with its momentum and without.
             groups = list(one_each.values())[:_CURVES]
             return [*groups[0], *(curve for curve, *_others in groups[1:])] if groups else []
 
@@ -251,10 +250,10 @@ class Search:
     def _backward_elimination(
         self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
     ) -> None:
-        """Leave out effects that a later one makes needless.
+        """Remove effects that a later one makes needless.
 
-        A wrong form of the library takes up a part of what an effect outside of it does, or of what another
-        one of the library does that is found after it.
+        A wrong form of the library absorbs a part of an effect outside of it, or of another effect that is
+        found later.
         """
         self._leave_out(accepted, states, rounds)
         for k in range(len(accepted) - 1):
@@ -269,7 +268,7 @@ class Search:
     def _relocated(
         self, k: int, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
     ) -> bool:
-        """Locate the last curve again in the place of all steps from a number on; whether that is better."""
+        """Relocate the last curve in place of all steps from a number on; return True if that is better."""
         before, curve = states[k], accepted[-1].curve
         if curve is None:
             return False
@@ -278,7 +277,7 @@ class Search:
         replacement = self.tests.best(before, trials, rounds[k])
         if replacement is None:
             return False
-        replacement = replacement[0], self._released(replacement[1], anew=True)
+        replacement = replacement[0], self._released(replacement[1], reestimate_noise=True)
         if not self._likelier(replacement, accepted[k:], states[-1]):
             return False
         accepted[k:], states[k + 1 :], rounds[k + 1 :] = [replacement[0]], [replacement[1]], []
@@ -296,9 +295,10 @@ class Search:
             return False
 
     def _leave_out(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
-        """Leave out effects of the library that chance explains beside those found after them.
+        """Remove effects of the library that are not significant next to those found after them.
 
-        All of them at once first: of two that are not needed neither is missed, but the other still fails.
+        All of them are removed at once first: of two needless effects each may fail a test with the other
+        present.
         """
         whole = states[-1].whole
         idle = [
@@ -323,8 +323,8 @@ class Search:
             replacement = replacement[0], self._released(replacement[1])
             if not self._likelier(replacement, later, states[-1]):
                 continue
-            left = {c.effect.name for c in kept}
-            others = [a for s in later for a in s.alternatives if a.instead_of in left]
+            kept_names = {c.effect.name for c in kept}
+            others = [a for s in later for a in s.alternatives if a.instead_of in kept_names]
             accepted[k:] = [replace(replacement[0], alternatives=others)]
             states[k + 1 :], rounds[k + 1 :] = [replacement[1]], []
             return

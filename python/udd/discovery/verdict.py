@@ -1,4 +1,4 @@
-"""The verdict: what is said of a record, from what was found and what stays open."""
+"""Verdict on a record, from the added effects and the open questions."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from udd.fitting.diagnostics import readings
 
 from .results import AddedEffect
 
-_SIZE = 0.98  # of the held-out error, below which a gain has a size
+_SIZE = 0.98  # ratio of held-out errors below which a gain has a size
 _DETERMINED = 3.0  # standard errors
 
 
 def verdict_of(
     added: Sequence[AddedEffect], unconfirmed: bool, doubts: Sequence[str], open_form: bool, stopped: bool
 ) -> str:
-    """The first that holds of these, from what is least to what is most sure.
+    """Return the first verdict that holds, from the least to the most certain.
 
     Parameters
     ----------
     added : sequence of AddedEffect
     unconfirmed : bool
-        Whether something was found in the first part that free runs over the rest do not confirm.
+        True if free runs over the rest do not confirm an effect found in the training part.
     doubts : sequence of str
-        What speaks against naming the form of what was found, see :func:`doubts_of`.
+        Reasons against naming the form of the effects, see :func:`doubts_of`.
     open_form : bool
-        Whether another form explains as much, or what is left or the known model's misfit is no noise.
+        True if another form explains as much, or the remaining or the known model's misfit is not noise.
     stopped : bool
-        Whether the search had no more time.
+        True if the search ran out of time.
     """
     if not added and unconfirmed:
         return "fits the first part, not confirmed"
@@ -46,32 +46,35 @@ def verdict_of(
 
 
 def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: int) -> list[str]:
-    """What speaks against naming the form of what was found, in sentences; empty where nothing does.
+    """List reasons against naming the form of the added effects, in sentences.
 
     Parameters
     ----------
     added : sequence of AddedEffect
     final : Fit
-        With them, of all data.
+        Fit of all data with the effects.
     ratio : tuple of float
         Held-out error of free runs after over before, with its interval.
     held_out : int
-        How many numbers were held out.
+        Count of held-out numbers.
     """
     result = []
     for effect in added:
         if contested(effect.by_record):
-            result.append(f"Only some of the records want {effect.title}.")
+            result.append(f"Only some of the records support {effect.title}.")
         if effect.like_a_drift(final.model):
             result.append(f"{effect.title} may be the drift of a sensor's zero.")
-        # Without this the friction of a pendulum with a power of 1.2 is identified as one that settles.
+        # Without this, friction with a power of 1.2 in a pendulum is identified as friction that settles with
+        # time.
         if brakes_with_time(effect.effect):
-            result.append(f"{effect.title}: as a swing dies down, the time stands for its size as well.")
+            result.append(
+                f"{effect.title}: as a swing decays, the effects of time and of amplitude are confounded."
+            )
         if not effect.is_law:
             result.append(f"{effect.title} is a curve, written as a formula: no law of one term.")
         elif open_constants := undetermined(effect, final):
             result.append(f"{effect.title}: the data do not determine {', '.join(open_constants)}.")
-    # A sensor that reads in coarse steps makes curves, too.
+    # A sensor that reads in coarse steps causes spurious curves, too.
     if any(effect.curve is not None for effect in added) and any(effect.coarse for effect in readings(final)):
         result.append("A sensor reads in coarse steps, and such errors make curves too.")
     if added and not has_size(ratio) and not any(_predicts(effect.ratio, held_out) for effect in added):
@@ -80,19 +83,19 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
 
 
 def has_size(ratio: Ratio) -> bool:
-    """Return True if held-out errors fall beyond doubt, and by at least 2 %."""
+    """Return True if held-out errors decrease significantly, and by at least 2 %."""
     return ratio[2] < 1.0 and ratio[0] <= _SIZE
 
 
 def _predicts(cost: Ratio, held_out: int) -> bool:
-    """Return True if the held-out frames become likelier beyond doubt, and by at least 10 nats."""
+    """Return True if the held-out frames become significantly more probable, by at least 10 nats."""
     return cost[2] < 1.0 and held_out * (1.0 / max(cost[0], 1e-300) - 1.0) / 2 >= EVIDENCE_MARGIN
 
 
 def undetermined(added: AddedEffect, final: Fit) -> list[str]:
-    """Constants of an effect that are within three standard errors of zero.
+    """Return constants of an effect that are within three standard errors of zero.
 
-    Amplitudes that stand together, as those of a sine and a cosine, count as one.
+    Amplitudes that belong together, such as those of a sine and a cosine, count as one.
     """
     order = list(final.parameters)
     result = []

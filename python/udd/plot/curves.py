@@ -74,7 +74,12 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     ax.plot(across * x, value, color=AFTER, linewidth=2, label="the curve")
     for one, colour in zip(formulas, _COLOURS, strict=False):
         ax.plot(
-            across * x, up * curve.beside(one.values(x), x), "--", color=colour, linewidth=1.4, label=one.text
+            across * x,
+            up * curve.aligned_with(one.values(x), x),
+            "--",
+            color=colour,
+            linewidth=1.4,
+            label=one.text,
         )
     ax.axhline(0, color="black", linewidth=0.8)
     shown = np.quantile(places, np.linspace(0.002, 0.998, 200))

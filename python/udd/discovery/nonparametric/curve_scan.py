@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.keywords import renamed_attribute
 from udd._util.one_line import OneLine
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.coordinates import Slot, coordinates, slots
@@ -98,6 +99,9 @@ class Curve(OneLine):
         """Slot and coordinates, without the momentum, for comparison."""
         return _key(self.slot, self.coordinates)
 
+    kin = renamed_attribute("kin", "key_without_momentum")
+    beside = renamed_attribute("beside", "aligned_with")
+
     def design(self, *x: Array) -> Array:
         """Evaluate the basis functions at places, (..., k)."""
         designs = [s.design(np.asarray(v, dtype=np.float64)) for s, v in zip(self.splines, x, strict=True)]
@@ -116,7 +120,7 @@ class Curve(OneLine):
         )
         return result
 
-    def beside(self, values: Array, *x: Array) -> Array:
+    def aligned_with(self, values: Array, *x: Array) -> Array:
         """Align another curve's values with this one in the confounded directions, for comparison."""
         if self.absorbed is None:
             return values
