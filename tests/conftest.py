@@ -8,6 +8,9 @@ import matplotlib
 import pytest
 
 matplotlib.use("Agg")  # no test opens a window
+# Threads of BLAS spin while they wait: beside another process, small systems took six times the processor
+# time. The processes of `pytest -n`, and those that tests start, inherit this.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A shell that starts the tests in the background has them ignore Ctrl-C, which some tests press.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
