@@ -127,7 +127,7 @@ def test_one_state_alone() -> None:
     exact = starts / np.sqrt(starts**2 + (1 - starts**2) * np.exp(-2 * t))
     assert udd.ensemble(line, t, starts).state[..., 0] == pytest.approx(exact, abs=1e-8)
     assert udd.lyapunov_spectrum(line, state0=[0.5]).exponents == pytest.approx([-2.0], abs=1e-8)
-    found = udd.basins(line, {"x": np.linspace(-2.0, 2.0, 8)})
+    found = udd.basins(line, {"x": np.linspace(-2.0, 2.0, 8)}, t_max=500.0)
     np.testing.assert_allclose(found.fraction, [0.5, 0.5])
     assert udd.poincare(udd.Model(["x"], ["cos(t)"]), "x", 4, state0=[0.0], transient=0).t == pytest.approx(
         2.0 * np.pi * np.arange(1, 5), abs=1e-8

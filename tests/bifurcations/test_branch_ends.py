@@ -24,17 +24,15 @@ def _points(branch: udd.Branch) -> list[tuple[str, float]]:
 def test_cycles_pass_both_folds_between_two_hopf_points() -> None:
     rest = udd.equilibria(MORRIS_LECAR, near=[-60.0, 0.01])[0]
     first, last = udd.continuation(rest, "I", (0.0, 300.0)).find("Hopf")
-    forward, back = (udd.continuation(hopf, bounds=(0.0, 300.0)) for hopf in (first, last))
-    folds = [point for point in forward.points if point.kind == "fold"]
+    branch = udd.continuation(first, bounds=(0.0, 300.0))
+    folds = [point for point in branch.points if point.kind == "fold"]
     assert abs(folds[1].value - 216.89980138941132) <= folds[1].error
     assert [round(fold.value, 3) for fold in folds] == [88.293, 216.9]
-    # From either end the same points, and the other end.
-    for branch, end in ((forward, last), (back, first)):
-        hopf = branch.points[-1]
-        assert len(branch.points) == 3 and hopf.kind == "Hopf"
-        assert abs(hopf.value - end.value) <= hopf.error + end.error
-        assert branch.ends[1].startswith("a Hopf bifurcation at")
-    assert sorted(p.value for p in back.find("fold")) == pytest.approx([p.value for p in folds], abs=1e-10)
+    # The test of the reactor goes from either end to the other one.
+    hopf = branch.points[-1]
+    assert len(branch.points) == 3 and hopf.kind == "Hopf"
+    assert abs(hopf.value - last.value) <= hopf.error + last.error
+    assert branch.ends[1].startswith("a Hopf bifurcation at")
 
 
 def test_the_stirred_reactors_cycles_go_from_one_hopf_point_to_the_other() -> None:

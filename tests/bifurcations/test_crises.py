@@ -19,7 +19,7 @@ def window() -> udd.Branch:
 
 @pytest.fixture(scope="module")
 def boundary() -> udd.Crisis:
-    (one,) = udd.crises(window(), n=41)  # the example of `udd.crises` follows a hundred orbits
+    (one,) = udd.crises(window(), n=15, depth=15)  # the nightly test follows more orbits for longer
     return one
 
 
@@ -64,7 +64,7 @@ def test_mirror_images_merge_before_the_boundary_crisis() -> None:
 
 def test_mirror_images_merge() -> None:
     orbit = udd.periodic_orbit(udd.DLE(7.7), [1.35958, -10.21032, 0.0])
-    (high,) = udd.crises(udd.continuation(orbit, "w", (7.5, 7.85)), n=41)
+    (high,) = udd.crises(udd.continuation(orbit, "w", (7.5, 7.85)), n=30, depth=30)
     assert high.kind == "attractor merging crisis" and high.cycle.symmetric
 
     def sides(w: float) -> float:

@@ -127,7 +127,7 @@ PLANE = udd.Model(["x", "v"], ["v", "x^2 - m + v*(b + x)"], {"b": 0.85, "m": 1.0
 
 
 def test_homoclinic_orbits_are_followed_over_two_parameters() -> None:
-    (one,) = udd.connections(PLANE, "b", (0.6, 0.8), n=3)
+    (one,) = udd.connections(PLANE, "b", (0.7, 0.8), n=2, t_max=8.0)
     curve = udd.locus(one, "m", (0.25, 1.5), within=(0.0, 2.0), ds=0.2)
     assert curve.kind == "homoclinic" and curve.ends == ("the bound 0.25", "the bound 1.5")
     assert curve.parameters == ("b", "m") and curve.values[0, 1] == 0.25 and curve.values[-1, 1] == 1.5
@@ -156,12 +156,12 @@ def test_homoclinic_orbits_are_followed_over_two_parameters() -> None:
 
 
 def test_a_shilnikov_orbit_of_the_damped_model_leads_to_that_without_damping() -> None:
-    found = udd.connections(udd.DLE(3.38), "w", (3.3767, 3.3769), n=3, t_max=11.0)
+    found = udd.connections(udd.DLE(3.38), "w", (3.37686, 3.37687), n=2, t_max=11.0)
     one = next(one for one in found if one.kind == "homoclinic")
-    curve = udd.locus(one, "B", (0.0, 0.002), within=(3.0, 4.0), ds=0.2)
+    curve = udd.locus(one, "B", (0.0, 0.001), within=(3.0, 4.0), ds=0.2)
     damped = curve.solutions[-1]
-    assert curve.ends == ("the bound 0", "the bound 0.002") and isinstance(damped, udd.Connection)
-    back = udd.locus(damped, "B", (0.0, 0.002), within=(3.0, 4.0), ds=0.2)
+    assert curve.ends == ("the bound 0", "the bound 0.001") and isinstance(damped, udd.Connection)
+    back = udd.locus(damped, "B", (0.0, 0.001), within=(3.0, 4.0), ds=0.2)
     assert back.values[0] == pytest.approx([3.3768624337325, 0.0], abs=1e-10)
 
 

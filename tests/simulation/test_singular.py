@@ -25,7 +25,7 @@ from udd.discovery.validation.confirmation import _expected
 
 def oscillator() -> udd.Discovery:
     """An oscillator driven by two waves, and braked by dry friction that one of the alternatives is like."""
-    t = np.arange(0, 40, 0.08)
+    t = np.arange(0, 30, 0.1)
     equations = {"x": "v", "v": "-k*x - c*v"}
     known = udd.Model(["x", "v"], equations, {"k": 9.0, "c": 0.1})
     truth = known.with_term("v", "sin(2.1*t)", drive=0.5).with_term("v", "abs(v)*v", drag=-0.05)

@@ -138,12 +138,13 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
 
     Examples
     --------
-    The small chaotic attractors of the diffusionless Lorenz equations just below w = 6:
+    The small chaotic attractors of the diffusionless Lorenz equations just below w = 6; 15 orbits show
+    their crisis:
 
     >>> import udd
     >>> model = udd.DLE(6.0)
     >>> orbit = udd.periodic_orbit(model, [0.7266504, -8.8243717, 0.0], settle=0.0)
-    >>> (one,) = udd.crises(udd.continuation(orbit, "w", (5.9, 6.1)))
+    >>> (one,) = udd.crises(udd.continuation(orbit, "w", (5.9, 6.1)), n=15, depth=15)
     >>> print(one.kind, one.side)
     boundary crisis above
     """
