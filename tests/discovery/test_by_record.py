@@ -26,7 +26,7 @@ def records(drags: list[float], seed: int = 0) -> list[udd.Measurement]:
     rng = np.random.default_rng(seed)
     result = []
     for k, drag in enumerate(drags):
-        t = np.arange(0, 30, 0.06)
+        t = np.arange(0, 20, 0.06)
         force = np.sin((1.1 + 0.3 * k) * t) + 0.6 * np.sin(2.3 * t + k)
         truth = oscillator().with_term("v", "abs(v)*v", drag=-drag)
         run = udd.simulate(truth, t, [1.0, 0.0], inputs={"u": force}, method="auto").state

@@ -500,7 +500,7 @@ def test_one_law_takes_the_place_of_several_that_come_near_it():
         return 0.01 * np.exp(-4 * (1 - np.cos(theta - 1)))
 
     law = lambda t, o, y, z, b: (float(push(np.arctan2(y, z))), 0.0, 0.0)  # noqa: E731
-    measured = unmodelled.record(law, 5, 40.0, noise=(5e-4, 7e-3))
+    measured = unmodelled.record(law, 5, 25.0, noise=(5e-4, 7e-3))
     result = udd.discover(measured, udd.Disk(W))
     (effect,) = result.effects
     assert effect.curve.name == ("torque", "theta")

@@ -21,7 +21,7 @@ KNOWN = udd.Pendulum(0.8, k0=0.013)
 def drifting(size: float) -> udd.Measurement:
     """A pendulum whose sensor's zero drifts, with this amplitude."""
     rng = np.random.default_rng(5)
-    t = np.arange(0, 50, 0.04)
+    t = np.arange(0, 30, 0.04)
     theta = udd.simulate(udd.Pendulum(0.82, k0=0.012), t, [0.0, 0.8]).state[:, 1]
     walk = np.cumsum(rng.standard_normal(len(t))) / np.sqrt(len(t))
     return udd.Measurement(t, {"theta": theta + size * walk + 2e-3 * rng.standard_normal(len(t))})
@@ -31,7 +31,7 @@ def test_a_drift_of_the_sensor_is_no_effect():
     measured = drifting(8e-3)
     assert udd.discover(measured, KNOWN).effects == []
     baseline = fit_record(measured, record_of(measured), KNOWN, search=True)
-    assert drift_gain(baseline) > 300  # far beyond the price of its freedom
+    assert drift_gain(baseline) > 150  # far beyond the price of its freedom
 
 
 def test_a_steady_sensor_gains_nothing_by_a_drift():

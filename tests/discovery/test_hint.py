@@ -23,13 +23,13 @@ RELAXED = udd.Disk(DRIVE, effects=[udd.effects.relaxation(b=1.5)])
 @functools.cache
 def relaxed():
     """A film of a disk whose constraint is relaxed a little, and the verdict: it may be a slip."""
-    measured, _ = film(RELAXED, np.random.default_rng(5), 30.0)
+    measured, _ = film(RELAXED, np.random.default_rng(5), 20.0)
     return measured, discovered.search(measured, udd.Disk(DRIVE))
 
 
 def second(times, seed=6):
     """A film of the same disk at another drive."""
-    return film(RELAXED.with_parameters({"W": times * DRIVE}), np.random.default_rng(seed), 30.0)[0]
+    return film(RELAXED.with_parameters({"W": times * DRIVE}), np.random.default_rng(seed), 20.0)[0]
 
 
 def test_evidence_is_said_as_odds():
@@ -51,7 +51,7 @@ def test_a_second_drive_is_proposed_for_slip_or_relaxation():
     # Neither another start nor a longer film at the one drive would tell.
     telling = [hint for hint in result.hints if any("slip c Z" in title for title in hint.parts)]
     assert all("times the drive" in hint.design for hint in telling)
-    assert result.hint.text in as_text(summary_of(result))
+    assert result.hint.text.split(" (odds")[0] in as_text(summary_of(result))  # which writes powers with ^
     json.dumps([hint.to_dict() for hint in result.hints])
 
 

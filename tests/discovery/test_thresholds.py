@@ -44,7 +44,7 @@ def test_a_delay_is_found() -> None:
 
 
 def test_a_spring_with_play_is_found() -> None:
-    t = np.arange(0, 16, 0.02)
+    t = np.arange(0, 12, 0.025)
     baseline = udd.Model(
         ["x", "v"], ["v", "gain*u - k*x - c*v"], {"gain": 1.0, "k": 5.0, "c": 0.4}, inputs=["u"]
     )
@@ -69,7 +69,7 @@ def test_a_spring_with_play_is_found() -> None:
 )
 def test_what_a_motor_does_not_give_is_found(kind: str, gone: str) -> None:
     """Nothing within 0.3 N m, or nothing more than 0.5: what is missing takes the whole gain, 20, away."""
-    t = np.arange(0, 12, 0.02)
+    t = np.arange(0, 9, 0.025)
     torque = 0.4 * drive(t, 5)
     run = udd.simulate(ARM.with_term("v", gone, less=-20.0), t, [0.3, 0.0], inputs={"torque": torque})
     seen = run.q + 1e-3 * np.random.default_rng(6).normal(size=len(t))

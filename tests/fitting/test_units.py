@@ -27,7 +27,7 @@ STRONG = {
 
 
 @functools.cache
-def record(hidden: str, seed: int = 2, duration: float = 40.0) -> udd.Measurement:
+def record(hidden: str, seed: int = 2, duration: float = 20.0) -> udd.Measurement:
     """A film of a disk at a drive that is 2 % faster than stated."""
     truth = udd.Disk(1.02 * DRIVE, effects=STRONG[hidden])
     return simulated.film(truth, np.random.default_rng(seed), duration)[0]
@@ -49,7 +49,7 @@ def test_a_strong_effect_is_no_wrong_unit(hidden, seed):
 
 def test_a_strong_relaxation_is_found_with_the_drive_as_stated():
     truth = udd.Disk(DRIVE, effects=STRONG["relaxation"])
-    measured, _states = simulated.film(truth, np.random.default_rng(2), 40.0)
+    measured, _states = simulated.film(truth, np.random.default_rng(2), 20.0)
     result = udd.discover(measured, udd.Disk(DRIVE))
     assert result.verdict == "effect identified"
     assert {"relaxation", "slip"} >= {f.effect.name for f in result.effects} and len(result.effects) == 1

@@ -577,7 +577,7 @@ def test_cut_and_mutated_files_are_read_or_refused_in_one_sentence(
     whole = BROKEN[name]()
     rng = np.random.default_rng(11)
     kind = format_of(whole[:4096], Path(name).suffix).name
-    few = times * (3 if kind in ("HDF5", "MATLAB", "Parquet") else 25)  # each of these takes a process
+    few = times * (2 if kind in ("HDF5", "MATLAB", "Parquet") else 25)  # each of these takes a process
     broken = [whole[: int(cut)] for cut in np.linspace(1, len(whole) - 1, few)]
     for _ in range(3 * few):
         mutated = bytearray(whole)

@@ -140,7 +140,7 @@ def test_the_page_follows_the_reader(pages: dict[str, str]) -> None:
         "To do it again",
     ]
     text = Page(pages["disk"]).words
-    assert "a disk of radius 8 cm that two wheels lift at 4.2 cm/s (as stated): 999 frames" in text
+    assert "a disk of radius 8 cm that two wheels lift at 4.2 cm/s (as stated): 499 frames" in text
     assert f"numpy {np.__version__}" in text
 
 

@@ -30,7 +30,7 @@ def search(measurement: Any, model: Any, **options: Any) -> udd.Discovery:
 def disk() -> udd.Discovery:
     """A disk whose rolling constraint is relaxed."""
     model = udd.Disk(DRIVE, effects=[udd.effects.relaxation(b=6.0)])
-    measured, _ = film(model, np.random.default_rng(3), 40.0)
+    measured, _ = film(model, np.random.default_rng(3), 20.0)
     return search(measured, udd.Disk(DRIVE))
 
 

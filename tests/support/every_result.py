@@ -50,7 +50,7 @@ def results() -> dict[str, Any]:
         "Section of two surfaces": udd.poincare(dle, ["z", "omega"], n=50),
         "Spectrum": udd.lyapunov_spectrum(udd.DLE(9.0), t=500.0, tol=0.1),
         "Covariant": udd.covariant_vectors(dle, 40),
-        "Forecast": udd.forecast(result.measurement, result.fit, start=30.0, members=16),
+        "Forecast": udd.forecast(result.measurement, result.fit, start=15.0, members=16),
         "Equilibrium": udd.equilibria(udd.DLE(8.0))[0],
         "PeriodicOrbit": cycle(),
         "Branch": branch(),

@@ -46,7 +46,7 @@ def interlaced(path: Path, motion: Motion, count: int) -> Path:
 
 
 def test_both_halves_of_a_frame_are_measured(tmp_path: Path) -> None:
-    motion, count = rolling(2.4), 36
+    motion, count = rolling(2.4), 24
     film = interlaced(tmp_path / "interlaced.mp4", motion, count)
     with av.open(str(film)) as said:
         assert next(said.decode(video=0)).interlaced_frame
