@@ -188,13 +188,13 @@ def test_an_effect_outside_the_library_is_located_and_written_down():
 def test_a_ripple_is_named_whenever_the_clock_starts():
     truth = udd.Disk(0.045, effects=[E.drive_ripple(a=0.05, f=1.3)])
     measured, _states = simulated.film(truth, np.random.default_rng(5), 20.0)
-    found = udd.discover(udd.Measurement(measured.t + 500.0, measured.values), udd.Disk(0.045))
-    (ripple,) = found.effects
-    assert found.verdict == "effect identified" and ripple.effect.name == "drive_ripple"
+    result = udd.discover(udd.Measurement(measured.t + 500.0, measured.values), udd.Disk(0.045))
+    (ripple,) = result.effects
+    assert result.verdict == "effect identified" and ripple.effect.name == "drive_ripple"
     # The phase counts from the first frame, which is half a frame after the run's start.
     turn = 2 * np.pi * 1.3 * 0.02
-    wanted = {"a": 0.05 * np.cos(turn), "b": -0.05 * np.sin(turn), "f": 1.3}
-    for name, value in wanted.items():
+    expected = {"a": 0.05 * np.cos(turn), "b": -0.05 * np.sin(turn), "f": 1.3}
+    for name, value in expected.items():
         assert abs(ripple.parameters[name] - value) < 4.5 * np.hypot(ripple.errors[name], 0.004 * abs(value))
 
 
