@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +165,25 @@ def test_marks_that_sit_elsewhere_are_no_noise() -> None:
     np.testing.assert_allclose(
         covariance(replace(tracks, residuals=off), LOOK), placed_well, rtol=1e-9, atol=1e-15
     )
+
+
+def test_a_disk_at_rest_shows_no_smaller_errors() -> None:
+    """Its frames all have one error, with which places of marks that are learned from them go along."""
+    tracks, _ = rolled(np.random.default_rng(2), 0.02, 0.02, 0.0)
+    moving = covariance(tracks, LOOK)
+    last = len(tracks) - 1
+    frames = [
+        FrameTrack(*(getattr(tracks, f.name)[min(k, last)] for f in fields(tracks))) for k in range(3000)
+    ]
+    frames = [replace(f, t=0.04 * k) for k, f in enumerate(frames)]
+    resting = Tracks.of(frames)
+    # as if the marks' places had been learned from the disk at rest
+    stays = resting.residuals[last] @ [1, 1j] * np.exp(-1j * resting.angle[last])
+    learned = stays * np.exp(1j * resting.angle)[:, None]
+    off = resting.residuals - np.stack([learned.real, learned.imag], axis=-1)
+    said = covariance(replace(resting, residuals=off), LOOK)
+    ratio = np.sqrt(np.einsum("nii->ni", said)[-1] / np.median(np.einsum("nii->ni", moving), axis=0))
+    assert (ratio > 0.7).all() and (ratio < 1.5).all()
 
 
 def test_what_a_path_is_bent_by_has_errors_of_its_own() -> None:

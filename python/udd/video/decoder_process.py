@@ -16,8 +16,10 @@ import math
 import os
 import struct
 import sys
+import tempfile
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 HEAD = struct.Struct(
@@ -103,6 +105,7 @@ def facts(stream: Any) -> dict[str, Any]:
     rate = stream.average_rate or stream.guessed_rate
     pixel = stream.codec_context.pix_fmt or ""
     full = stream.codec_context.color_range == 2 or pixel.startswith(("yuvj", "rgb", "bgr", "gbr"))
+    full = full and stream.codec_context.color_trc not in HDR  # which `StandardLight` makes limited
     return {
         "frames": int(stream.frames),
         "fps": float(rate) if rate else None,
@@ -144,12 +147,14 @@ def packets(container: Any, stream: Any) -> tuple[int, int, array[int]]:
 
 def send(container: Any, stream: Any, since: float) -> None:
     """Write all pictures, then the end with the number of packets that did not decode."""
-    broken = [0]
+    broken, standard = [0], StandardLight(stream)
     for index, t, frame, damaged in pictures(container, stream, since, broken):
+        rotation = frame.rotation or 0
+        frame = standard(frame)
         if frame.format.name not in ("yuv420p", "yuvj420p"):
             frame = frame.reformat(format="yuv420p")
         y, u, v = frame.planes[:3]
-        turns = round((frame.rotation or 0) / 90) % 4  # phones note how they were held
+        turns = round(rotation / 90) % 4  # phones note how they were held
         put(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
         for plane in (y, u, v):
             put(pixels(plane))
@@ -237,6 +242,86 @@ class Fields:
                     yield self.graph.pull()
                 except (av.error.BlockingIOError, av.error.EOFError):
                     break
+
+
+class StandardLight:
+    """Frames with the light of a standard screen: those of HDR films (PQ, HLG) are mapped to sRGB.
+
+    The same code is another amount of light there, and the primaries of BT.2020 make colours paler.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self.light = HDR.get(stream.codec_context.color_trc)
+        self.graph: Any = None
+
+    def __call__(self, frame: Any) -> Any:
+        """Return the frame, mapped if the film is HDR."""
+        if self.light is None:
+            return frame
+        if self.graph is None:
+            self.graph = self._graph(self.light)
+        self.graph.push(frame)
+        return self.graph.pull()
+
+    def _graph(self, light: Callable[[float], float]) -> Any:
+        import av
+
+        graph = av.filter.Graph()
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "light.cube")
+            with open(path, "w", encoding="ascii") as file:
+                file.write(light_cube(light))
+            steps = [
+                graph.add_buffer(template=self.stream),
+                graph.add("scale", in_color_matrix="bt2020"),
+                graph.add("format", pix_fmts="gbrp10le"),
+                graph.add("lut3d", file=path),
+                graph.add("scale", out_color_matrix="bt601", out_range="tv"),
+                graph.add("format", pix_fmts="yuv420p"),
+                graph.add("buffersink"),
+            ]
+            for a, b in pairwise(steps):
+                a.link_to(b)
+            graph.configure()
+        return graph
+
+
+def light_of_pq(code: float) -> float:
+    """Return the light of a PQ code from 0 to 1 (SMPTE ST 2084); 1 is diffuse white, 203 cd/m^2 (BT.2408)."""
+    root = code ** (32 / 2523)
+    return 10000 / 203 * (max(root - 107 / 128, 0.0) / (2413 / 128 - 2392 / 128 * root)) ** (8192 / 1305)
+
+
+def light_of_hlg(code: float) -> float:
+    """Return the light of an HLG code from 0 to 1 (BT.2100); 1 is diffuse white, code 0.75 (BT.2408)."""
+    a, b, c = 0.17883277, 0.28466892, 0.55991073
+    scene = code * code / 3 if code <= 0.5 else (math.exp((code - c) / a) + b) / 12
+    return scene / 0.26496256
+
+
+#: Curves of HDR films by their number in the header (ITU-T H.273).
+HDR = {16: light_of_pq, 18: light_of_hlg}
+#: From the primaries of BT.2020 to those of BT.709 (BT.2087).
+NARROWER = ((1.6605, -0.5876, -0.0728), (-0.1246, 1.1329, -0.0083), (-0.0182, -0.1006, 1.1187))
+CUBE = 33  # codes of each colour in the table
+
+
+def light_cube(light: Callable[[float], float]) -> str:
+    """Return a table (.cube) from codes of BT.2020 with this curve to sRGB."""
+    codes = [light(k / (CUBE - 1)) for k in range(CUBE)]
+    rows = [f"LUT_3D_SIZE {CUBE}"]
+    for blue in codes:
+        for green in codes:
+            for red in codes:
+                rows.append(" ".join(f"{srgb(r * red + g * green + b * blue):.5f}" for r, g, b in NARROWER))
+    return "\n".join(rows) + "\n"
+
+
+def srgb(light: float) -> float:
+    """Return the sRGB code (IEC 61966-2-1), from 0 to 1, of an amount of light."""
+    x = min(max(light, 0.0), 1.0)
+    return 12.92 * x if x <= 0.0031308 else 1.055 * x ** (1 / 2.4) - 0.055
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -104,7 +105,7 @@ def repeats_last(items: list[Any], sights: list[Sight]) -> list[Any]:
 
 
 def _apart(a: Sight, b: Sight) -> float:
-    turn = abs(np.angle(np.exp(1j * (a.angle - b.angle))))
+    turn = abs(cmath.phase(cmath.exp(1j * (a.angle - b.angle))))  # numpy takes ten times as long
     return float(abs(a.centre - b.centre) + turn * a.reach)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,8 @@ class Lens:
     @property
     def row(self) -> tuple[float, ...]:
         """As eight numbers: middle u, v, size, curve, tilts, aspect, shear."""
-        return (self.middle.real, self.middle.imag, *astuple(self)[1:])
+        bent = (self.size, self.curve, self.tilt_u, self.tilt_v, self.aspect, self.shear)
+        return (self.middle.real, self.middle.imag, *bent)
 
     @np.errstate(invalid="ignore")  # NaN: where the disk was not seen
     def plane(self, picture: Complexes | complex) -> Complexes:

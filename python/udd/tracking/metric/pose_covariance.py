@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from udd.tracking.geometry.pose import DiskAppearance
 from udd.tracking.passes.tracks import Tracks
 
-from .streak_errors import mark_residuals, unit_covariance
+from .streak_errors import mark_residuals, new_poses, unit_covariance
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not speak for the others
@@ -25,14 +25,15 @@ def covariance(tracks: Tracks, look: DiskAppearance) -> Array:
     are neither; the marks' disagreement shows by how much, along their streaks and across: a rigid disk
     leaves 2 m - 3 of the 2 m coordinates of m marks over.
     """
-    off, used = mark_residuals(tracks), np.isfinite(tracks.chi2)
+    new, used = new_poses(tracks, look.reach), np.isfinite(tracks.chi2)
+    off = mark_residuals(tracks, new)
     spare = np.maximum(2 * used.sum(axis=1) - 3, 0)
     chi2 = np.einsum("nmi,nmij,nmj->nm", off, tracks.marks.astype(float), off)
     total = np.where(used, chi2, 0.0).sum(axis=1)
-    usual, belief, group = _usual(total, spare, tracks.streak)
+    usual, belief, group = _usual(total, spare, tracks.streak, new)
     # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
     inflation = (belief * usual + total) / (belief + spare)
-    return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, off, group))
+    return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, off, group, new))
 
 
 def add_shared_errors(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
@@ -47,23 +48,33 @@ def add_shared_errors(covariance: Array, centre_sigma: float, shared: Sequence[A
     return np.asarray(out)
 
 
-def _usual(total: Array, spare: NDArray[np.int_], streak: Array) -> tuple[Array, Array, NDArray[np.int_]]:
-    """Misfit per spare coordinate of frames with like streaks, the coordinates that is worth, their group.
+def _usual(
+    total: Array, spare: NDArray[np.int_], streak: Array, new: NDArray[np.bool_]
+) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Return the misfit per spare coordinate of frames with like streaks, its weight and their group.
 
-    Of a variance that itself is drawn anew for each frame, 1 / variance being gamma distributed, the mean
-    given a frame's misfit is that of both, and the less they scatter the more the usual one counts.
+    The weight is a number of coordinates. Only frames with a new pose show it. If each frame's variance
+    is drawn anew, 1 / variance being gamma distributed, the mean given a frame's misfit is that of both; the
+    less they scatter, the more the usual one counts.
     """
     out, belief = np.ones(len(total)), np.full(len(total), ALIKE)
     which = np.full(len(total), -1)
     known = np.flatnonzero(spare > 0)
     order = known[np.argsort(streak[known], kind="stable")]
-    groups = np.array_split(order, max(1, min(6, len(order) // GROUP))) if len(order) else []
+    showing = order[new[order]]
+    if not len(showing):
+        return out, belief, which
+    groups = np.array_split(showing, max(1, min(6, len(showing) // GROUP)))
+    ends = np.array([streak[group].max() for group in groups[:-1]])
+    number_of = np.searchsorted(ends, streak[order])
     for number, group in enumerate(groups):
         each = total[group] / spare[group]
         most = OUTLIER * float(np.median(each))
         each = np.minimum(each, most)
         level = float(np.sum(each * spare[group]) / spare[group].sum())
-        out[group], belief[group], which[group] = level, _belief(each / level, spare[group]), number
+        members = order[number_of == number]
+        out[members], belief[members] = level, _belief(each / level, spare[group])
+        which[members] = number
     return out, belief, which
 
 

@@ -11,20 +11,42 @@ from udd.tracking.passes.tracks import Tracks
 
 Array = NDArray[np.float64]
 OUTLIER = 6.0  # times the median square; a mark beyond does not speak for the others
+SAME = 0.7  # pixels: the disk is where it was before
+FEWEST = 20  # poses that show how large errors are
 LEAST = 0.05  # share of the misfit that either direction has at least
 
 
-def mark_residuals(tracks: Tracks) -> Array:
-    """What each mark is off, (n, marks, 2), without what it is off in all frames: that is its place."""
+def new_poses(tracks: Tracks, reach: float) -> NDArray[np.bool_]:
+    """Mark the frames that show the disk as no earlier frame does, (n,); all if these are too few.
+
+    The frames of a disk at rest all have the same error, so that together they count as one.
+    """
+    out = np.zeros(len(tracks), dtype=bool)
+    rows = np.flatnonzero(tracks.tracked)
+    turned = np.mod(tracks.angle[rows], 2 * np.pi) * reach
+    at = np.column_stack([tracks.centre[rows].real, tracks.centre[rows].imag, turned])
+    _, first = np.unique(np.round(at / SAME), axis=0, return_index=True)
+    out[rows[first] if len(first) >= FEWEST else rows] = True
+    return out
+
+
+def mark_residuals(tracks: Tracks, new: NDArray[np.bool_]) -> Array:
+    """Return the residuals of the marks (n, marks, 2) without what is common to all poses: a mark's place.
+
+    `new` marks the frames with a new pose.
+    """
     turn = np.exp(1j * tracks.angle)[:, None]
     off = tracks.residuals @ np.array([1, 1j]) * turn.conj()
-    seen = np.isfinite(off).any(axis=0)
-    off[:, seen] -= np.nanmedian(off[:, seen].real, axis=0) + 1j * np.nanmedian(off[:, seen].imag, axis=0)
+    seen = np.isfinite(off[new]).any(axis=0)
+    usual = off[new][:, seen]
+    off[:, seen] -= np.nanmedian(usual.real, axis=0) + 1j * np.nanmedian(usual.imag, axis=0)
     off *= turn
     return np.stack([off.real, off.imag], axis=-1)
 
 
-def unit_covariance(tracks: Tracks, look: DiskAppearance, off: Array, group: NDArray[np.int_]) -> Array:
+def unit_covariance(
+    tracks: Tracks, look: DiskAppearance, off: Array, group: NDArray[np.int_], new: NDArray[np.bool_]
+) -> Array:
     """Covariance (n, 3, 3) of (u, v, beta) for a misfit of 1 per coordinate that is left over.
 
     Along its streak a mark fades over many pixels, and errors that many pixels share, as those of
@@ -38,7 +60,7 @@ def unit_covariance(tracks: Tracks, look: DiskAppearance, off: Array, group: NDA
     for number in np.unique(group[group >= 0]):
         members = [int(k) for k in np.flatnonzero((group == number) & tracked)]
         frames = [_marks(tracks, look, off, around, k) for k in members]
-        ratio = _ratio([f for f in frames if f is not None])
+        ratio = _ratio([f for k, f in zip(members, frames, strict=True) if f is not None and new[k]])
         for k, frame in zip(members, frames, strict=True):
             out[k] = np.linalg.inv(tracks.information[k]) if frame is None else _covariance(frame[0], ratio)
     return out

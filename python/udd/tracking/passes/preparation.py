@@ -28,7 +28,7 @@ from udd.tracking.marks.learning import MOST, first_look, places, refine
 from udd.tracking.marks.localization import MISFIT
 from udd.tracking.marks.pose_fit import align
 from udd.tracking.options import TrackOptions
-from udd.video.reader import Film, Picture, TrackError
+from udd.video.reader import Film, Picture, Plane, TrackError
 
 from .first_pass import TrackerState
 from .second_pass import LocalMotion
@@ -39,6 +39,8 @@ FEWEST = 3  # frames in motion from which marks are learned a second time
 SHARP = 60  # slow frames from which the rim is measured
 FOR_LENS = 90  # frames from which tilt and lens are measured
 LENS_ROUNDS = 3  # the second and third time, marks are measured without the first's distortion
+FEWEST_POSES = 12  # from which marks are learned
+SAME = 0.7  # pixels: the disk is where it was before
 SQUARE = 0.15  # pixels by which marks at right angles may seem to be off
 RIM_SMEAR = 3.0  # pixels by which lens and compression blur the rim
 SURE = 4.0  # standard errors of the layout by which it may be further off, up to as much again
@@ -188,10 +190,27 @@ def recalibrate(
         )
     moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(known.exposure)) for y, here in frames]
     moving.sort(key=lambda f: known.look.streak(f[2]))
+    moving = _with_new_poses(moving, known.look)
     slower = moving[: -(-len(moving) // 2)]
     fixed = None if wanted.layout else options.layout.unit
     look = refine(known.look, slower[:: -(-len(slower) // MOST)], known.view, AGAIN, fixed)
     return replace(known, look=look)
+
+
+def _with_new_poses(
+    frames: list[tuple[Plane, Pose, Motion]], look: DiskAppearance
+) -> list[tuple[Plane, Pose, Motion]]:
+    """Return the frames that show the disk as no earlier one does; all of them if these are too few.
+
+    A mark's place that is learned from a disk at rest has the error of that one pose.
+    """
+    new: dict[tuple[int, int, int], tuple[Plane, Pose, Motion]] = {}
+    for frame in frames:
+        pose = frame[1]
+        turned = (pose.angle % (2 * np.pi)) * look.reach
+        at = (pose.centre.real, pose.centre.imag, turned)
+        new.setdefault((round(at[0] / SAME), round(at[1] / SAME), round(at[2] / SAME)), frame)
+    return list(new.values()) if len(new) >= FEWEST_POSES else frames
 
 
 def _rim(
