@@ -13,6 +13,7 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import tracked
 import udd
+from small_films import shot
 from udd.cli import main
 from udd.errors import UddError
 from udd.film import Defects
@@ -98,3 +99,24 @@ def test_what_is_no_film_has_no_page(tmp_path: Path, film: Path) -> None:
     with pytest.raises(UddError, match="was not tracked in a film"):
         page(film, udd.Measurement(t, {"theta": np.sin(t)}), tmp_path / "page.html")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_refused_film_leaves_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film, page = (
+        shot(tmp_path / "no_red.mp4", 1.0, defects=Defects(mark_strength=(0, 0, 1, 1))),
+        tmp_path / "why.html",
+    )
+    assert main(["track", str(film.path), "--out", str(tmp_path / "a.csv"), "--page", str(page)]) == 1
+    said = capsys.readouterr().err
+    assert "no disk with marks in red, orange, blue and green" in said and f"written: {page}" in said
+    html = page.read_text(encoding="utf-8")
+    assert "no disk with marks in red" in html and html.count("data:image/jpeg") == 6
+    cells = re.findall(r"<t[dh][^>]*>([^<]*)</t[dh]>", html)
+    counts = {name: cells[cells.index(name) + 1] for name in ("red", "orange", "blue", "green")}
+    assert counts["red"].startswith("0 of") and not counts["blue"].startswith("0 of")
+
+
+def test_a_wrong_option_leaves_no_page(tmp_path: Path) -> None:
+    page = tmp_path / "why.html"
+    assert main(["track", str(tmp_path / "none.mp4"), "--page", str(page)]) == 1
+    assert not page.exists()

@@ -165,6 +165,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     try:
         m = _tracked(args, options, detail).with_meta(**more)
     except UddError as error:
+        _explain(args, options, str(error))
         if args.click is None:
             raise
         raise UddError(f"{error} ({said.strip()})") from None
@@ -192,6 +193,17 @@ def run(args: argparse.Namespace) -> CommandResult:
             sys.stdout.write(table.read_text(encoding="utf-8"))
         print(f"udd: {text}", file=sys.stderr)
     return CommandResult("", data, _code(m))
+
+
+def _explain(args: argparse.Namespace, options: dict[str, Any], reason: str) -> None:
+    """Write the page of a film that is refused, if a page was asked for."""
+    if args.page is None:
+        return
+    from udd.report.refused_film import write_refused
+
+    given = {"disk_radius": args.disk_radius, **options}
+    if write_refused(args.file, reason, args.page, given=given, command=_command(args)):
+        print(f"udd: written: {args.page}, which shows why the film was refused", file=sys.stderr)
 
 
 def _code(m: Measurement) -> int:
