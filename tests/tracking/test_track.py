@@ -250,7 +250,7 @@ def test_a_film_cut_off_in_its_data(shots: list[NDArray[np.uint8]], motion: Moti
 
 def test_a_film_cut_off_before_its_index(film: Path, tmp_path: Path) -> None:
     data = film.read_bytes()
-    (tmp_path / "cut.mp4").write_bytes(data[: len(data) // 2])  # the index stands at the end
+    (tmp_path / "cut.mp4").write_bytes(data[: len(data) // 2])  # the index is at the end
     says(tmp_path / "cut.mp4", "cut off")
 
 

@@ -335,7 +335,7 @@ def test_the_window_can_be_left(frames: list[Picture]) -> None:
 
 @pytest.fixture
 def sat(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Callable[[Window], None]]]:
-    """What the person does who sits before the window of `udd.tracking.click`."""
+    """A person at the window of `udd.tracking.click`."""
     module = importlib.import_module("udd.tracking.manual.click")
     does: list[Callable[[Window], None]] = []
     windows: list[Window] = []

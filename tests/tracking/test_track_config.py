@@ -1,4 +1,4 @@
-"""What a config file says to the tracker, and what it may not say."""
+"""Config files of the tracker, right and wrong ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said of errors holds: light of mixed colours, uneven light, a wobble, frames unlike each other."""
+"""Standard errors hold: light of mixed colours, uneven light, a wobble, frames unlike each other."""
 
 from __future__ import annotations
 

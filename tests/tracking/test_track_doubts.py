@@ -1,4 +1,4 @@
-"""What a film knows of itself: gravity, the drive, its clock, its turns; and what it leaves in doubt."""
+"""Gravity, drive, clock and turns of a film, and its doubts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Array = np.ndarray[Any, Any]
 
 
 def noise(n: int, seed: int) -> tuple[Array, Array]:
-    """Of a small film: pixels, and rad."""
+    """Noise of a small film: pixels, and rad."""
     random = np.random.default_rng(seed)
     return 0.02 * (random.normal(size=n) + 1j * random.normal(size=n)), 3e-4 * random.normal(size=n)
 

@@ -134,7 +134,7 @@ def test_nothing_outside_the_region_is_looked_at(tmp_path: Path) -> None:
         ([{"tag": "9x9:1", "at": [0, 0], "side": 0.03}], "no dictionary '9x9'"),
         ([{"tag": "4x4_50:1", "at": [0, 0]}], "must say tag, at = [y, z] and side"),
         ([{"tag": "4x4_50:1", "at": [0, 0], "side": -1}], "side of mark 1 must be a positive"),
-        ([TAGS[0], TAGS[0]], "stands there twice"),
+        ([TAGS[0], TAGS[0]], "a tag occurs twice"),
     ],
 )
 def test_layouts_that_cannot_be(said: Any, why: str) -> None:
@@ -232,7 +232,7 @@ def test_a_bob_that_grows_in_the_light_is_not_lost(clock: Callable[[float], floa
 
 
 def test_a_path_that_is_no_circle_is_refused(clock: Callable[[float], float], tmp_path: Path) -> None:
-    """As of the lower bob of a double pendulum."""
+    """The lower bob of a double pendulum has such a path."""
     rng = np.random.default_rng(4)
     long = [200 + 30 * np.sin(0.9 * k) for k in range(60)]
     shots = [swinging(clock, k / FPS, 0.0, rng, long=each) for k, each in enumerate(long)]

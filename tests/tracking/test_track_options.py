@@ -1,4 +1,4 @@
-"""What can be told of a film, and the one list of what is calibrated."""
+"""Options of a film, and the list of calibrated items."""
 
 from __future__ import annotations
 

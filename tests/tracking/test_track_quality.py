@@ -1,4 +1,4 @@
-"""What the table of a tracked film says of each frame, and that every reader takes it."""
+"""Quality columns of a tracked film, and that every reader takes them."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from udd.tracking.passes.wobble import wobble
 
 
 def tracks(amplitude: float, noise: float, axis: float = 0.0, n: int = 400) -> tuple[Tracks, DiskAppearance]:
-    """What is left of four marks 100 pixels out on a disk that turns and wobbles, exactly and with noise."""
+    """Residuals of four marks 100 pixels out on a disk that turns and wobbles, exactly and with noise."""
     rng = np.random.default_rng(2)
     t = np.arange(n) / 25
     angle = 3 * np.sin(2 * t) + t

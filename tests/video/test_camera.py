@@ -28,7 +28,7 @@ FPS = 30.0
 
 
 class Webcam:
-    """What `cv2.VideoCapture` shows of a camera: frames with its clock's times [ms], then nothing."""
+    """A camera as `cv2.VideoCapture` shows it: frames with its clock's times [ms], then nothing."""
 
     def __init__(self, shots: list[tuple[float, NDArray[np.uint8]]], there: bool = True) -> None:
         self.shots: Iterator[tuple[float, NDArray[np.uint8]]] = iter(shots)

@@ -1,4 +1,4 @@
-"""What goes wrong in front of a real camera and inside it, to be put into a film on purpose."""
+"""Defects of real scenes and cameras, to be put into a film on purpose."""
 
 from __future__ import annotations
 
@@ -164,10 +164,10 @@ class Defects:
 
 
 def source_of_pixels(camera: Camera, defects: Defects) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return, for each pixel of the bent picture, the place (x, y) of a true-to-scale one that it shows.
+    """Return the place (x, y) of each pixel of the bent picture in a true-to-scale one.
 
-    A pinhole camera at `distance` looks at the pivot from beside and below; the lens then moves a point at
-    distance r (corner: 1) from the picture's middle inward by the factor 1 - lens r^2.
+    A pinhole camera at `distance` looks at the pivot from beside and below. The lens then moves points inward
+    by the factor 1 - lens r^2, r being the distance from the picture's middle (corner: 1).
     """
     width, height = camera.size
     middle = np.array([(width - 1) / 2, (height - 1) / 2])
@@ -181,7 +181,7 @@ def source_of_pixels(camera: Camera, defects: Defects) -> tuple[NDArray[np.float
         qx, qy = px / shrink, py / shrink
     u, v = qx * corner + middle[0] - camera.pivot[0], qy * corner + middle[1] - camera.pivot[1]
     a, b = defects.off_axis
-    # rays (u, v, f) in the camera, turned into the laboratory; the camera stands at -distance along its axis
+    # rays (u, v, f) in the camera, turned into the laboratory; the camera is at -distance along its axis
     focal = camera.scale * defects.distance
     ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
     right, down = np.array([ca, 0, -sa]), np.array([sa * sb, cb, ca * sb])

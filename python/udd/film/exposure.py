@@ -128,8 +128,8 @@ class Scene:
 def sub_times(motion: Motion, time: float, camera: Camera, radius: float, readout: float = 0.0) -> Array:
     """Space sub-frames evenly through the exposure, as many as the fastest point of the rim needs.
 
-    They are spread so that their times have the variance of the whole exposure's, not only its mean: where
-    the disk turns back, few of them have to stand for a path that bends.
+    Their times have the mean and the variance of the whole exposure: where the disk turns back, a few of them
+    represent a curved path.
     A rolling shutter's exposure lasts from the first row's opening to the last row's closing.
     """
     whole = camera.exposure + readout / float(camera.rate)

@@ -57,8 +57,8 @@ def checked(trajectory: TrajectoryLike) -> tuple[Array, Array]:
 def motion_of(trajectory: TrajectoryLike) -> Motion:
     """Interpolate the motion: a function of time, (m,) s -> (m, 4).
 
-    It is the run's own dense output where there is one; else a cubic through the samples, with the slopes
-    of the model's right-hand side where there is a model (Hermite), otherwise those of a spline. Before the
+    It is the run's dense output if there is one. Otherwise it is a cubic through the samples, with the slopes
+    of the model's right-hand side (Hermite) or, without a model, those of a spline. Before the
     first and after the last sample the disk moves on uniformly: the shutter opens half an exposure before the
     first frame's time.
     """
@@ -115,8 +115,8 @@ def _cubic(t: Array, state: Array, model: Any) -> Motion:
 def spacing_error(trajectory: TrajectoryLike, radius: float) -> float:
     """Estimate the largest error of a mark's place between the samples, in m.
 
-    Every second sample is left away and predicted from the others: a cubic's error falls by 2^4 when the
-    spacing halves, so a sixteenth of the misfit is what stands between the samples that are there.
+    Every second sample is left out and predicted from the others. A cubic's error falls by 2^4 when the
+    spacing halves, so the error between all samples is a sixteenth of the misfit.
     """
     if dense_output(trajectory) is not None:
         return 0.0

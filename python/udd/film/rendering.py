@@ -79,7 +79,7 @@ class Film(Drawable):
 
     @property
     def truth(self) -> Measurement:
-        """What a perfect tracker would measure: Y, Z, beta in the middle of each exposure."""
+        """The measurement of a perfect tracker: Y, Z, beta in the middle of each exposure."""
         values = np.where(self.held[:, None], self.state[:, 1:], np.nan)
         return Measurement(self.t, values, meta={"R": self.radius, "source": self.path.name})
 
@@ -104,11 +104,11 @@ def render(
     """Film a simulated run: what a camera before the device would see.
 
     A white disk with four square marks (side R/5, centres 65/80 R from the disk's centre; clockwise red,
-    orange, blue, green, with red at the angle beta) hangs between two wheels, before a wall. The support
-    stands in front: it hides the middle of the disk and now and then a mark. Each frame is the average, in
+    orange, blue, green, with red at the angle beta) hangs between two wheels, before a wall. The support is
+    in front: it hides the middle of the disk and sometimes a mark. Each frame is the average, in
     linear light, of as many sub-frames as the exposure needs for smooth streaks. Frame k is exposed
-    symmetrically about ``trajectory.t[0] + k / fps``; the last frame is the last whose exposure ends within
-    the run, so a disk that leaves the wheels is filmed until it leaves.
+    symmetrically about ``trajectory.t[0] + k / fps``. The exposure of the last frame ends within the run, so
+    a disk that loses contact is filmed until then.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What stands still in the picture: the wall and the table, the device behind the disk and in front of it."""
+"""The parts of the picture at rest: the wall and the table, the device behind the disk and in front of it."""
 
 from __future__ import annotations
 

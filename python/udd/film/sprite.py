@@ -85,6 +85,6 @@ def _stick(light: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.flo
 
 
 def _band(v: NDArray[np.float64], centre: float, width: float) -> NDArray[np.float64]:
-    """Find how much of each pixel (1 wide, at v) a band of that centre and width covers."""
+    """Compute the share of each pixel (1 wide, at v) that a band of that centre and width covers."""
     low, high = np.maximum(v - 0.5, centre - width / 2), np.minimum(v + 0.5, centre + width / 2)
     return np.asarray(np.clip(high - low, 0.0, 1.0), dtype=np.float64)

@@ -44,8 +44,8 @@ class Layout:
     Attributes
     ----------
     places : tuple of complex
-        Centres of the marks at beta = 0 [m from the disk's centre, u to the right, v down]. Of the standard
-        layout only the directions are meant.
+        Centres of the marks at beta = 0 [m from the disk's centre, u to the right, v down]. The standard
+        layout has directions only.
     colours : tuple of (int, int, int)
         sRGB codes.
     standard : bool
@@ -163,7 +163,7 @@ def _check(layout: Layout) -> None:
     for number, chroma in enumerate(np.hypot(*layout.chroma.T), start=1):
         if chroma < PALEST:
             raise TrackError(
-                f"layout: mark {number} has no colour (grey, black and white cannot be told apart)"
+                f"layout: mark {number} has no colour; grey, black and white marks are not recognised"
             )
     alike = same_colour(layout.chroma)
     middle = places - places.mean()

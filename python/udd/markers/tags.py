@@ -51,7 +51,7 @@ def read_tags(said: Sequence[Any]) -> tuple[Tag, ...]:
     if len({t.dictionary for t in tags}) > 1:
         raise TrackError("layout: all tags must be of one dictionary")
     if len({t.number for t in tags}) < len(tags):
-        raise TrackError("layout: one tag stands there twice")
+        raise TrackError("layout: a tag occurs twice; each may occur once")
     return tags
 
 

@@ -77,7 +77,10 @@ def write_refused(
     names = _names(options)
     sections = [
         Section("Why not", (Paragraph(f"{reason}.", "warn"), *(Paragraph(text) for text in TRY))),
-        Section("What looks like a mark", (_counted(names, patches), Gallery(_frames(film, few, patches)))),
+        Section(
+            "Patches in the colours of the marks",
+            (_counted(names, patches), Gallery(_frames(film, few, patches))),
+        ),
         Section("The film", (_facts(film, look_over, some),)),
     ]
     head = Head("No motion was measured", "The tracker refuses this film.", numbers=(), notes=())

@@ -1,4 +1,4 @@
-"""What `udd.track` can be told of a film: one record, read and checked once."""
+"""Options of `udd.track`: one record, read and checked once."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Sigma:
 
 
 def _told(kind: str, note: str = "") -> dict[str, str]:
-    """What a config file must say of an option, and the remark with which one is written."""
+    """Return the form of an option in a config file, and the remark with which one is written."""
     return {"kind": kind, "note": note}
 
 
@@ -57,7 +57,7 @@ class MoreOptions(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class TrackOptions:
-    """All that can be told of a film, read and free of contradictions; `udd.track` says what each is.
+    """Options of a film, read and free of contradictions; `udd.track` says what each is.
 
     Attributes
     ----------

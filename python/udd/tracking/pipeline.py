@@ -60,7 +60,7 @@ UNSURE = 0.005  # of the disk's radius: a position known no better is not given
 
 @dataclass(frozen=True)
 class Tracking:
-    """A measurement, and what it was made from."""
+    """A measurement with the tracks, the calibration and the camera from which it was made."""
 
     measurement: Measurement
     tracks: Tracks
@@ -109,14 +109,14 @@ def track(
     scale : float, optional
         Pixels per metre in the disk's plane, given instead of found.
     calibrate : mapping, optional
-        What the film is asked for: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: found (so
-        if not given); False: as given, or not there; a number (lens, readout [s], exposure [s]): just that.
+        Items to calibrate: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: from the film (the
+        default); False: as given, or absent; a number (lens, readout [s], exposure [s]): that value.
     bob : str, (r, g, b) or two of these, optional
         The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
         picture's vertical, about the centre of the bob's path (or `pivot`). Two colours, the upper bob
         first: a double pendulum, ``th1`` and ``th2`` from the vertical.
     config : path, mapping or TrackOptions, optional
-        A TOML file (or what would stand in one) with any of these arguments; what is given here wins.
+        A TOML file (or its entries) with any of these arguments; arguments given here win.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.
@@ -126,8 +126,8 @@ def track(
         ``region``: (u0, v0, u1, v1), the part of the picture in which the disk moves [pixels]; nothing
         outside it is looked at.
         ``sigma``: standard errors of what is given: ``pivot`` [pixels], ``scale`` [pixels per metre],
-        ``layout`` [m]. With one, it is a beginning that the film improves; where the film does not tell, it
-        stands. Without, it is exact.
+        ``layout`` [m]. With one, the given value is a start that the film improves, and it stays if the film
+        does not determine it. Without one, it is exact.
         ``apart``: (int, int, float), numbers of two marks (from 1; of the standard ones that is red) and the
         distance of their middles [m], measured on the disk: that sets the scale.
         ``length``: with `bob`, from the pendulum's pivot to the bob's middle [m]; sets the scale.
@@ -145,13 +145,13 @@ def track(
     Raises
     ------
     TrackError
-        The file is missing, empty, not a film or too short; no marks are found; the radius is not a
-        positive number; the layout or the config holds an unknown key or a value of the wrong kind.
+        The file is missing, empty, not a film or too short. No marks are seen. An option has a wrong key or
+        value.
 
     Notes
     -----
-    The contact point comes from the rolling constraint dY/dT = Z Omega, dZ/dT = -Y Omega + W, with a
-    drive of any constant velocity: a calibration that assumed no slip is never evidence about slip.
+    The contact point comes from the rolling constraint dY/dT = Z Omega, dZ/dT = -Y Omega + W, with a drive of
+    any constant velocity. This calibration assumes no slip, so it is no evidence about slip.
 
     Examples
     --------
@@ -192,7 +192,7 @@ def run_tracker(
     watch: Watch | None = None,
     **given: Any,
 ) -> Tracking | Measurement:
-    """As `track`, with what was found on the way where the film is a disk's."""
+    """Track as `track` does, and return the poses in pixels as well if the film shows a disk."""
     options = read_options(config, **given)
     film = Film(video, fps=options.fps)
     if options.bob is not None:
@@ -210,10 +210,10 @@ def track_disk(
     watch: Watch | None = None,
     **given: Any,
 ) -> Tracking:
-    """As `track` of a disk, with all that was found on the way, in pixels; `watch` is told of each frame."""
+    """Track a disk, return also the poses in pixels; `watch` is called with each frame."""
     found = run_tracker(video, progress=progress, watch=watch, **given)
     if not isinstance(found, Tracking):
-        raise TrackError("a pendulum's film has no marks to tell of in detail")
+        raise TrackError("a pendulum's film has no marks, so there is no detail; use udd.track")
     return found
 
 
@@ -222,7 +222,7 @@ def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractCont
 
 
 def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
-    """Coloured marks: survey, calibrate, follow, refine, to metres, flags."""
+    """Track coloured marks: survey, calibrate, follow, refine, convert to metres, flag."""
     look_over, camera = steadied(film, survey(film))
     found = _measured(film, look_over, camera, options, progress, watch)
     if _retimed(film, found):
@@ -238,7 +238,7 @@ def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: W
 
 
 def _retimed(film: Film, found: Tracking) -> bool:
-    """Whether parts of the film are slowed down, as the drive shows; its clock goes by the drive then."""
+    """Return True if the drive shows that parts are slowed down; the clock then follows the drive."""
     tracks = found.tracks
     parts = [] if film.forced or film.slower else slow_parts(tracks.t, tracks.centre, tracks.angle)
     if not parts:
@@ -255,7 +255,7 @@ def _gravity(m: Measurement) -> ApparentGravity | None:
 
 
 def _with_doubts(film: Film, found: Tracking) -> Tracking:
-    """The same with what makes it doubtful in its header, which is also said as warnings."""
+    """Add the doubts about a film to the header of its measurement, and warn of each."""
     m, gravity = found.measurement, _gravity(found.measurement)
     said = doubts(gravity, found.camera, film.fps, int(m.meta["turns_doubtful"]))
     for doubt in said:
@@ -272,12 +272,12 @@ def _measured(
     progress: Progress,
     watch: Watch | None,
 ) -> Tracking:
-    """One run over a film whose pictures are corrected as far as is known."""
+    """Run the tracker once over a film with its present corrections."""
     there = recognise(film, look_over, options)
     look_over, options = there.look_over, there.options
     known, rim = prepare(film, look_over, there.sights, there.seen, options, there.clear)
     tracks = _follow(film, known, look_over.frames, progress, watch)
-    # where the contact was known the paths were curved, and poses stand in their middle
+    # with a known contact the paths were curved, and poses lie in their middle
     tracks = _unwrap(tracks, known.exposure if known.contact is None else 0.0)
     if options.refine:
         known = recalibrate(known, look_over, tracks, options)
@@ -287,7 +287,7 @@ def _measured(
 
 
 def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
-    """Printed tags: each frame by itself, in one pass."""
+    """Track printed tags: each frame by itself, in one pass."""
     frames = film.promised or film.packets
     with _bar(film, frames, "track", progress) as bar:
         tell = _teller(film, DiskAppearance([], 0.0, 1.0, film.light, np.inf), frames, bar, watch)
@@ -298,7 +298,7 @@ def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Wa
 def _teller(
     film: Film, look: DiskAppearance, frames: int, bar: Count, watch: Watch | None
 ) -> Callable[[Picture, Pose], None]:
-    """What a pass calls after each picture: the progress bar moves, and `watch` is told."""
+    """Return the function that a pass calls after each picture: it moves the bar and calls `watch`."""
 
     def tell(picture: Picture, pose: Pose) -> None:
         bar.update()
@@ -309,7 +309,7 @@ def _teller(
 
 
 def _unwrap(tracks: Tracks, open_for: float) -> Tracks:
-    """Means over the exposure taken to its middle, whole turns counted by the rates about gaps."""
+    """Move means over the exposure to its middle, and count whole turns by the rates at gaps."""
     centre, angle = tracks.centre, tracks.angle
     if open_for:
         centre, angle = at_middle(tracks.t, centre, angle, open_for)
@@ -318,7 +318,7 @@ def _unwrap(tracks: Tracks, open_for: float) -> Tracks:
 
 @dataclass(frozen=True)
 class _Upright:
-    """Poses of a disk that stays in its plane, and what they have in common."""
+    """Poses of a disk that stays in its plane, with camera, rim and shared errors."""
 
     tracks: Tracks
     known: TrackerState
@@ -338,7 +338,7 @@ def _to_metres(
     look_over: Survey | None = None,
     moved: CameraMotion | None = None,
 ) -> Tracking:
-    """The measurement in metres, without what is vague or has left the wheels; `twice`: of two passes."""
+    """Return the measurement in metres, without vague and gone frames; `twice`: of two passes."""
     if moved is not None and not moved.steady:
         why = lost("the background is not seen, and the camera moves")
         tracks = tracks.without(~moved.known[: len(tracks)], why)
@@ -361,7 +361,7 @@ def _to_metres(
     shared = [*disk.shared, *(alike[:, None] * np.eye(3)[axis] for axis in (0, 1))]  # u and v: two causes
     values, sigma, rho = metres(tracks, add_shared_errors(own, centre_sigma, shared), camera)
     gone = left_the_wheels(tracks.t, values, options.disk_radius, camera.pivot_sigma, camera.drive)
-    # by how much the centre is off that was said, all frames are: that makes none of them vague
+    # all frames share the error of a centre that was given: it makes none of them vague
     spread = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2
     vague = ~gone & (spread > (UNSURE * options.disk_radius) ** 2)
     for table in (values, sigma, rho):
@@ -396,7 +396,7 @@ def _upright(
     twice: bool,
     look_over: Survey | None,
 ) -> _Upright:
-    """Scale and contact, and a wobble undone where one is seen."""
+    """Find scale and contact, and undo a wobble if there is one."""
 
     def camera() -> Camera:
         return camera_of(tracks, known, size_of(known.look.places, rim, options), options)
@@ -422,7 +422,7 @@ def _upright(
 def _rim_upright(
     look_over: Survey, stood: WobbleCorrection, known: TrackerState, rim: Rim, options: TrackOptions
 ) -> Rim:
-    """The rim again, from frames whose foreshortening is known; its centre from where it was."""
+    """Measure the rim again, from frames with a known foreshortening; its centre from its former place."""
     tracks, around = stood.tracks, LocalMotion(stood.tracks)
     frames = []
     for picture in look_over.pictures:
@@ -454,7 +454,7 @@ def _refine(film: Film, known: TrackerState, tracks: Tracks, progress: Progress)
 def pictures_at(
     video: str | os.PathLike[str], frames: Sequence[int], tracked: Measurement | None = None
 ) -> list[NDArray[np.uint8]]:
-    """Frames of a film by their number, as RGB arrays (height, width, 3), for drawing upon.
+    """Return frames of a film by their number, as RGB arrays (height, width, 3).
 
     With `tracked`, what `udd.track` made of the film, they are corrected as they were for it: steadied,
     turned upright.
@@ -474,7 +474,7 @@ def pictures_at(
 
 
 def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> Film:
-    """A film whose pictures are those in which places were measured."""
+    """Open a film with the corrections of a measurement."""
     film = Film(video)
     if tracked is not None:
         film.correct = correction_of(tracked.meta, tracked.quality, film.full_range)
@@ -484,9 +484,9 @@ def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> F
 def pictures_between(
     video: str | os.PathLike[str], t: NDArray[np.float64], tracked: Measurement | None = None
 ) -> Iterator[NDArray[np.uint8]]:
-    """The frames nearest to increasing times, as RGB arrays, corrected as for `tracked` if that is given.
+    """Yield the frames nearest to increasing times, as RGB arrays, corrected as for `tracked` if given.
 
-    What comes long before them is not decoded.
+    Frames long before them are not decoded.
     """
     film, wanted = _as_tracked(video, tracked), iter(t.tolist())
     want = next(wanted, None)

@@ -2,7 +2,7 @@
 
     python -P decoder_process.py PATH MEMORY
 
-It is told what to do by lines: `look`, or the time [s] from which pictures are wanted. It answers with
+It reads one request per line: `look`, or the time [s] of the first picture. It answers with
 a line of JSON: what the header says, or an error. For a look the times of all frames follow, in ticks of the
 container: as many whole numbers of 8 bytes as `stamps` says. Else each picture's head and planes follow, and
 an end. Run as a script, it imports nothing but PyAV: it is there in a fifth of the time that the
@@ -101,7 +101,7 @@ def opened(path: str) -> Any:
 
 
 def facts(stream: Any) -> dict[str, Any]:
-    """What the header says."""
+    """Return the entries of the header."""
     rate = stream.average_rate or stream.guessed_rate
     pixel = stream.codec_context.pix_fmt or ""
     full = stream.codec_context.color_range == 2 or pixel.startswith(("yuvj", "rgb", "bgr", "gbr"))
@@ -154,7 +154,7 @@ def send(container: Any, stream: Any, since: float) -> None:
         if frame.format.name not in ("yuv420p", "yuvj420p"):
             frame = frame.reformat(format="yuv420p")
         y, u, v = frame.planes[:3]
-        turns = round(rotation / 90) % 4  # phones note how they were held
+        turns = round(rotation / 90) % 4  # phones note their orientation
         put(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
         for plane in (y, u, v):
             put(pixels(plane))
@@ -222,7 +222,7 @@ class Fields:
         self.graph: Any = None
 
     def __call__(self, frames: list[Any]) -> Iterator[Any]:
-        """What a packet held, in order; the last half frame of a film is left in the filter."""
+        """Yield the pictures of a packet in order; the last half frame of a film stays in the filter."""
         import av
 
         for frame in frames:

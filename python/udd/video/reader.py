@@ -110,8 +110,8 @@ class Film:
     has the full resolution, and names of marks from the colour, whose samples lie half a pixel off.
     A container that counts milliseconds (Matroska, WebM, FLV) rounds the times of a constant rate: they are
     those of the rate then, see :attr:`clock`. Times that truly vary stay as they are.
-    Decoders are large and films come from anywhere, so they run in a process of their own, with limits
-    on memory, pixels and silence: a film that breaks it ends there, and is an error at worst.
+    Decoders are large and films come from anywhere, so they run in another process, with limits on memory,
+    pixels and silence. A film that breaks the decoder is an error here.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, fps: Rates | None = None) -> None:
@@ -125,7 +125,7 @@ class Film:
         if self.path.stat().st_size == 0:
             raise TrackError(f"{self.path}: the file is empty")
         rates = None if fps is None else frame_rates(fps)
-        if find_spec("av") is None:  # what decodes runs elsewhere, where nobody would be told
+        if find_spec("av") is None:  # the decoder runs in another process, which could not raise this
             raise ModuleNotFoundError("No module named 'av'", name="av")
         self.broken = 0  # packets that did not decode in the last run
         self._idle: _Decoder | None = None  # between runs
@@ -204,7 +204,7 @@ class _Decoder:
         self.end = self.child.end
 
     def ask(self, request: str) -> dict[str, Any]:
-        """What the header says, or an error; pictures follow where a time was asked for."""
+        """Return the entries of the header or an error; pictures follow if a time was requested."""
         self.broken, self.whole = 0, False
         try:
             self.child.send(request.encode() + b"\n")

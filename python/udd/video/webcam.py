@@ -25,7 +25,7 @@ from udd._util.validation import number
 from .reader import TrackError
 from .writer import checked_path, require_video, write_film
 
-RATE = 30  # frames per second that the encoder is told; each has its own time
+RATE = 30  # frames per second in the encoder's settings; each frame has its time
 TICKS = 3000  # per such frame: time stamps to 1/90000 s, as in MPEG
 QUALITY = 16.0  # constant rate factor; a grain of 2 codes is kept
 LATE = 1.5  # usual intervals: after a longer one a frame was lost
@@ -35,7 +35,7 @@ MILLISECONDS = 0  # cv2.CAP_PROP_POS_MSEC, the camera's own time
 
 
 class Source(Protocol):
-    """What is used of a `cv2.VideoCapture`."""
+    """The part of `cv2.VideoCapture` that is used."""
 
     def isOpened(self) -> bool:
         """Whether there is a camera."""
@@ -81,7 +81,7 @@ class Recording:
         return link_to(self.path, str(self))
 
     def __str__(self) -> str:
-        """What was recorded, in one sentence."""
+        """The recording in one sentence."""
         rate, last = 1 / self.interval, self.t[-1]
         what = f"{len(self.t)} frames in {last:.2f} s, {rate:.1f} a second by the {self.clock}'s clock"
         if not self.lost:

@@ -1,1 +1,1 @@
-"""What is known of a film before it is measured: config files, scale, exposure, rolling shutter, rim."""
+"""Calibration of a film before the measurement: config files, scale, exposure, rolling shutter, rim."""

@@ -1,4 +1,4 @@
-"""What is known of a film, from a TOML file."""
+"""Options of the tracker from a TOML file."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     Parameters
     ----------
     config : path or mapping
-        A TOML file, or what would stand in one: the fields of `TrackOptions` by name, each as `udd.track`
-        takes it.
+        A TOML file or its entries: the fields of `TrackOptions` by name, each as `udd.track` takes it.
     **given
         The same by name; None is not given.
 
@@ -54,7 +53,7 @@ def read_options(config: Config | TrackOptions | None, **given: Any) -> TrackOpt
 
 
 def as_said(config: Config) -> tuple[str, Mapping[str, Any]]:
-    """The name of a config, and what stands in it, unread."""
+    """Return the name of a config and its entries, unread."""
     if isinstance(config, Mapping):
         return "config", config
     if not isinstance(config, str | os.PathLike):

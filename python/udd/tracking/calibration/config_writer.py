@@ -16,7 +16,7 @@ from udd.video.reader import TrackError
 
 from .config import settings
 
-TABLES = ("calibrate", "sigma", "layout")  # TOML wants them after the rest
+TABLES = ("calibrate", "sigma", "layout")  # TOML requires them after the rest
 
 
 @checked_arguments(error=TrackError)
@@ -26,7 +26,7 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
     Parameters
     ----------
     path : path
-        File to write; one that stands there is replaced, by all of the new one or not at all.
+        File to write; an existing one is replaced when the new one is complete.
     config : mapping
         Arguments of `udd.track` by name: ``pivot``, ``scale``, ``layout``, ..., each as it is given there.
     comment : str, optional
@@ -86,7 +86,7 @@ def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
 
 
 def _plain(text: str) -> str:
-    """What TOML and UTF-8 have no room for (a file's name may hold anything) as question marks."""
+    """Replace characters outside of TOML and UTF-8, which a file's name may hold, by question marks."""
     return "".join(c if c.isprintable() else "?" for c in text)
 
 

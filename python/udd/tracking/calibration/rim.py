@@ -44,9 +44,9 @@ def outline(
 ) -> Rim:
     """Circle through the rim points of many frames, in the frame that turns with the disk.
 
-    Where light, shadow or lens shift the whole rim, they do so in the picture; as the disk turns this is told
-    from its centre. The rim is looked for within `span` of the marks' reach. `short` is by how much each
-    frame's disk is stretched (below 0: foreshortened) in the direction `across`.
+    Light, shadow or lens shift the whole rim in the picture; if the disk turns, this is distinguished from
+    its centre. The rim is looked for within `span` of the marks' reach. `short` is the relative stretch of
+    each frame's disk (below 0: foreshortened) in the direction `across`.
     """
     angles = np.arange(RAYS) * (2 * np.pi / RAYS)
     rays = np.exp(1j * angles)
@@ -64,7 +64,7 @@ def outline(
         group.append(np.full(int(ok.sum()), number))
     z = np.concatenate(points) if points else np.empty(0, dtype=complex)
     if len(z) < 60:
-        raise TrackError("the disk's rim cannot be told from the background, so the film has no scale")
+        raise TrackError("the disk's rim does not stand out from the background, so it gives no scale")
     return turning_circle(z, np.concatenate(turns), np.concatenate(group))
 
 

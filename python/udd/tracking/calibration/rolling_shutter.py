@@ -37,8 +37,8 @@ def readout(
 ) -> Readout:
     """Find the readout under which the marks of the moving disk keep their distances; 0 if none is needed.
 
-    A mark in a row that is exposed by dt later is displaced by its velocity times dt. What of these
-    displacements is no rigid motion is compared with what the marks disagree by.
+    A mark in a row that is exposed by dt later is displaced by its velocity times dt. The part of these
+    displacements that is no rigid motion is compared with the disagreement of the marks.
     """
     total, sigma = 0.0, np.inf
     fastest = sorted(frames, key=lambda f: -_speed(f[2], look))[:MOST]

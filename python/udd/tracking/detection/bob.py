@@ -66,7 +66,7 @@ class BobColour:
 
 @dataclass(frozen=True)
 class Background:
-    """What stands still, and where a bob may be."""
+    """The part of the pictures at rest, and the region of the bob."""
 
     picture: Picture
     grain: float  # of the pictures about it [codes]

@@ -13,7 +13,7 @@ from udd.video.reader import Picture
 from .colour_blobs import Blobs, blobs
 
 SAME = 0.985  # cosine between two colours' directions above which they are one
-NEAR = 0.22  # of the marks' reach: how far a blob may lie from the mark it stands for
+NEAR = 0.22  # of the marks' reach: largest distance of a blob from its mark
 
 
 def colours_of(

@@ -144,7 +144,7 @@ def _sight(centre: complex, arm: complex, mark: int, area: NDArray[np.float64]) 
 def sightings(
     pictures: list[Picture], choose: Callable[[list[list[Blobs]]], list[list[Blobs]]] = lambda every: every
 ) -> tuple[list[Sight | None], int | None]:
-    """The disk in each picture where its marks can be told, None elsewhere; and the mark that is missing.
+    """Find the disk in each picture, None if its marks are not recognised; and the mark that is missing.
 
     Strong colours are looked for first, then faded ones, then three marks instead of four. `choose` picks the
     patches that may be marks.

@@ -1,4 +1,4 @@
-"""What brightness a pixel has that shows a coloured mark in part, and the bare disk in the rest."""
+"""Brightness of pixels that a coloured mark and the bare disk share."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def mixed(light: Array, white: float, mark: float, colour: Array, full_range: bo
     """Amount of light, for each brightness code, of a mix of disk and mark in proportion to their shares.
 
     Colours mix as light, red, green and blue each by itself, and a brightness code is a sum of what the sRGB
-    curve makes of the three. So half red and half white is brighter than the mean of the light of both codes
-    (by some 5 % of their difference): a streak whose one end is hidden would be taken for longer than it is.
-    The codes of disk and mark keep their light, and a mark as bright as the disk, whose mixes no brightness
-    tells apart, all codes theirs.
+    curve makes of the three. So half red and half white is brighter than the mean of the light of both codes,
+    by some 5 % of their difference. A streak with a hidden end would seem too long.
+    The codes of disk and mark keep their light. If the mark is as bright as the disk, brightness does not
+    distinguish their mixes, and all codes keep their light.
 
     Parameters
     ----------

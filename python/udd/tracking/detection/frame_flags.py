@@ -1,4 +1,4 @@
-"""What is said of a frame that holds no position: one word, and why."""
+"""Flags of frames without a position: one word and the reason."""
 
 from __future__ import annotations
 

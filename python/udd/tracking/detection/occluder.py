@@ -1,4 +1,4 @@
-"""What stands before the disk and never moves: the support, the wheels, anything fixed to them."""
+"""Things in front of the disk that never move: the support, the wheels, anything fixed to them."""
 
 from __future__ import annotations
 

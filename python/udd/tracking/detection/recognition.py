@@ -20,7 +20,7 @@ from .layout_matching import sightings as matching
 from .still_patches import split
 from .survey import Survey, slowest
 
-SAME_PLACE = 1.5  # pixels by which something that stands still may seem to move
+SAME_PLACE = 1.5  # pixels: apparent motion of a thing at rest
 SAME_ANGLE = 0.03  # rad by which it may seem to turn
 OFTEN = 0.3  # share of the sights in one place from which on the others are looked for
 ALWAYS = 0.95  # share of them from which on what is seen never moves

@@ -18,9 +18,9 @@ FEWEST = 12  # frames to judge by
 class Lens:
     """Map from the picture to the plane of the disk, both in pixels (u + iv).
 
-    With p the picture point from the picture's middle in units of `size`:  q = p (1 + curve |p|^2),
-    w = q / (1 + tilt_u q_u + tilt_v q_v), then u is stretched by 1 + aspect and v sheared by `shear`: what is
-    upright in the middle of the picture is so in the plane, as for any camera that is not rolled.
+    p is the picture point from the picture's middle in units of `size`. Then q = p (1 + curve |p|^2) and w =
+    q / (1 + tilt_u q_u + tilt_v q_v); u is stretched by 1 + aspect and v sheared by `shear`. A vertical in
+    the middle of the picture is vertical in the plane, as for any camera that is not rolled.
     """
 
     middle: complex = 0j
@@ -100,7 +100,7 @@ SQUARE = np.array([-1j, 1, 1j, -1])
 
 
 def middle_of(shape: tuple[int, int]) -> complex:
-    """Where the middle of a picture (height, width) is, about which its lens bends it [pixels]."""
+    """Return the middle of a picture (height, width), the centre of its lens distortion [pixels]."""
     return complex(shape[1] / 2, shape[0] / 2)
 
 
@@ -161,7 +161,7 @@ def _layout(points: Complexes, body: Complexes) -> Complexes:
 
 
 def _misfit(points: Complexes, seen: NDArray[np.bool_], places: Complexes) -> Array:
-    """What is left of each frame after the best rigid motion of `places` onto it."""
+    """Return the residuals of each frame after the best rigid motion of `places` onto it."""
     count = seen.sum(axis=1, keepdims=True)
     p = np.where(seen, points, 0)
     q = np.where(seen, places[None, :], 0)

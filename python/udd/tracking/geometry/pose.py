@@ -48,7 +48,7 @@ class Motion:
     def of_rates(
         cls, rate: complex, spin: float, bending: complex, twisting: float, open_for: float
     ) -> Motion:
-        """What an exposure sees of a path with these derivatives."""
+        """Make the motion in an exposure from the derivatives of the path."""
         half = 0.5 * open_for**2
         shift, turn = rate * open_for, spin * open_for
         return cls(shift, turn, bending * half, twisting * half, rate, spin, bending, twisting)
@@ -61,7 +61,7 @@ class Motion:
 
     @property
     def rolling(self) -> tuple[float, ...]:
-        """What rows of other times need, as six numbers: rate u, v, spin, bending u, v, twisting."""
+        """Derivatives for rows of other times, as six numbers: rate u, v, spin, bending u, v, twisting."""
         rate, bending = complex(self.rate), complex(self.bending)
         return (rate.real, rate.imag, self.spin, bending.real, bending.imag, self.twisting)
 

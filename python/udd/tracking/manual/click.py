@@ -40,7 +40,7 @@ def click(
         Arguments of `udd.track` by name, for its ``config`` or for `udd.tracking.write_config`: ``pivot``,
         ``region`` [pixels, u right and v down], ``scale`` [pixels per metre], ``layout`` (marks [m], colours
         as sRGB codes; beta is 0 where the first one is above the disk's centre), ``disk_radius`` [m] where
-        only the distance tells it, and in ``sigma`` how well each is known. What was skipped is not there.
+        only the distance tells it, and in ``sigma`` how well each is known. Skipped questions have no entry.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def click(
     >>> udd.tracking.write_config("disk.toml", known)  # doctest: +SKIP
     >>> m = udd.track("run.mp4", config=known)  # doctest: +SKIP
 
-    What it returns, of two marks and a contact that were clicked:
+    The result of two marks and a contact that were clicked:
 
     >>> said = {"pivot": [138.2, 166.0], "scale": 877.1}
     >>> said["sigma"] = {"pivot": 3.0, "scale": 9.0, "layout": 0.0012}

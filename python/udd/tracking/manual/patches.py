@@ -59,8 +59,8 @@ class Patch:
 def patch(picture: Picture, at: complex, full_range: bool, miss: float = CLICK) -> Patch | None:
     """The patch of like colour about a place clicked to `miss` [pixels]; None where there is no colour.
 
-    A pixel belongs to it by the direction of its colour and half its strength. What is not a whole rectangle
-    (hidden in part, or grown into its surroundings) leaves the click where it was.
+    A pixel belongs to it by the direction of its colour and half its strength. A patch that is no whole
+    rectangle (partly hidden, or grown into its surroundings) leaves the click in place.
     """
     import cv2
 

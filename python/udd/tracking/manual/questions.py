@@ -1,4 +1,4 @@
-"""What is asked of a person who clicks on a frame, and what is made of the answers; no window here."""
+"""Questions to a person who clicks on a frame, and the options from the answers; no window here."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SKIPPED = {
 
 @dataclass(frozen=True)
 class Answers:
-    """What has been clicked, in pixels (u + iv)."""
+    """Clicked points, in pixels (u + iv)."""
 
     pivot: complex | None = None
     marks: tuple[Patch, ...] = ()
@@ -92,17 +92,17 @@ class ClickSession:
 
     @property
     def miss(self) -> float:
-        """By how much a hand misses [pixels]."""
+        """Standard error of a click [pixels]."""
         return max(CLICK, CLICK * float(self.picture.y.shape[0]) / ROWS)
 
     @property
     def question(self) -> str:
-        """What is asked now, by name: one of `ASKED`, empty where all is answered."""
+        """Name of the present question, one of `ASKED`; empty if all are answered."""
         return self.history[-1].question
 
     @property
     def answers(self) -> Answers:
-        """What has been clicked."""
+        """Clicked points."""
         return self.history[-1].answers
 
     @property
@@ -117,7 +117,7 @@ class ClickSession:
 
     @property
     def hint(self) -> str:
-        """What Enter does now."""
+        """Effect of the Enter key."""
         if self.question == "end":
             return ""
         here = getattr(self.answers, self.question) if self.question else None
@@ -174,7 +174,7 @@ class ClickSession:
             self.history.pop()
 
     def config(self) -> dict[str, Any]:
-        """What was known and what was clicked, as in a config file."""
+        """Return the given and the clicked options, as in a config file."""
         a, out = self.answers, dict(self.known)
         calibrate, sigma = dict(out.pop("calibrate", {})), dict(out.pop("sigma", {}))
         if a.pivot is not None:
@@ -327,7 +327,7 @@ def check(known: Mapping[str, Any], distance: float | None) -> None:
 
 
 def _faults(marks: tuple[Patch, ...]) -> str:
-    """What is wrong with marks as a layout; empty where nothing is."""
+    """Return the fault of marks as a layout; empty if there is none."""
     if len(marks) < 2:
         return "One mark is not enough: click another, or take it back (Backspace) for the paper's own four."
     middle = complex(np.mean([m.centre for m in marks]))

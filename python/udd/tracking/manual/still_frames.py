@@ -16,9 +16,9 @@ MOST = 8  # frames to choose from
 def still_frames(look_over: Survey) -> list[Picture]:
     """Frames of the survey, the calmest first, no two of one burst.
 
-    A frame moves by the larger of its differences from the two beside it, so that one that a codec repeated
-    is not calm. What hides marks, or smears them until they are pale, takes coloured samples away; a coloured
-    background is there in all frames alike. Where all frames are unusable, all of them.
+    A frame moves by the larger of its differences from both neighbours, so that a frame that a codec repeated
+    is not calm. Hidden marks, or marks that blur makes pale, reduce the coloured samples; a coloured
+    background is the same in all frames. Where all frames are unusable, all of them.
     """
     found: list[tuple[float, int, Picture]] = []
     for burst in look_over.bursts:

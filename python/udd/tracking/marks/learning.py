@@ -192,7 +192,7 @@ def _shape_step(
 
 
 def _replace_places(marks: list[Mark], fits: list[Seen]) -> list[Mark]:
-    """Move the marks on the disk to where all frames together want them.
+    """Move the marks on the disk to their best places for all frames together.
 
     Linear least squares for the eight coordinates with the pose of every frame free (eliminated frame
     by frame); half-hidden marks count by what they inform. The three motions of all marks together

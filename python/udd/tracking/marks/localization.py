@@ -1,4 +1,4 @@
-"""What a mark looks like, and where in the picture it is: sub-pixel, blurred, or half hidden."""
+"""Appearance of a mark and its place in the picture: sub-pixel, blurred, or half hidden."""
 
 from __future__ import annotations
 
@@ -99,12 +99,12 @@ def locate(
     """Offsets of the marks from their expected places by least squares on the visible pixels.
 
     The light about a mark is modelled as  white + level (gain c - du dc/du - dv dc/dv), with white,
-    gain, du, dv free, the gain within `gain_slack` of 1. `view` is False where something stands in
-    front; pixels that nothing of this explains (a hand, a cable) lose their weight. Each of `rounds`
+    gain, du, dv free, the gain within `gain_slack` of 1. `view` is False behind things in front; unexplained
+    pixels (a hand, a cable) lose their weight. Each of `rounds`
     takes edges as known to so many pixels and ends with a Gauss-Newton step of the pose.
 
-    Returns the pose at the end (u, v, beta), what the last round saw, which of that it used, its step
-    (None: fewer than two marks hold the disk), and the step's size in pixels.
+    Returns the last pose (u, v, beta); the sightings of the last round; which of them it used; its step, None
+    if fewer than two marks were seen; and the step's size in pixels.
     """
     numbers = [look.psf, look.noise, gain_slack, look.rim, FAINT * float(look.light[-1])]
     at, found, used, step, moved = _core.align_marks(

@@ -1,4 +1,4 @@
-"""What the film said of its camera and of the device: the camera that places are told by, and a table."""
+"""The calibration from the film: the camera that gives places in metres, and a table of all items."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def _numbers(lens: Lens) -> list[float]:
 def estimates(
     tracks: Tracks, known: TrackerState, camera: Camera, options: TrackOptions, turned: Wobble
 ) -> dict[str, Estimate]:
-    """What is known of every item.
+    """Return the value, the standard error and the origin of every item.
 
     Lengths in m, times in s, the contact in pixels of the picture, the rest bare numbers; `how` is "found",
     "none found" (0 is as good), "given" (also where it was switched off), or says from what.

@@ -27,11 +27,11 @@ def common_mode_errors(tracks: Tracks, covariance: Array, camera: Camera) -> Arr
     """Standard error (n,) of u and of v that `covariance` lacks; 0 where it is less than its own error.
 
     Codecs move all that goes the same way alike, by a vector or by leaving out what changes little. A disk
-    that rolls keeps (see `pivot`)  (c - p) exp(-i angle) - d * integral exp(-i angle) dt ; over three frames
-    in a row slip changes that evenly, so that its second difference is what the frames' own errors make it.
-    Where the law of rolling itself fails, by a slip that depends on where the disk is, or for a contact taken
-    elsewhere, that difference is not noise, but seen from the wheels it changes little from frame to frame:
-    therefore the second difference of the second differences is what counts.
+    that rolls keeps (see `pivot`)  (c - p) exp(-i angle) - d * integral exp(-i angle) dt . Slip changes that
+    evenly over three frames in a row, so its second difference shows the errors of the frames. If the law of
+    rolling fails, by a slip that depends on the place of the disk or by a wrong contact, that difference is
+    not noise. Seen from the wheels it then changes little between frames, so the second difference of the
+    second differences is used.
     """
     out = np.zeros(len(tracks))
     if not np.isfinite(camera.drive):

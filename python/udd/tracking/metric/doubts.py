@@ -1,4 +1,4 @@
-"""What a film contradicts or leaves open, in sentences: its clock, its orientation, contact and turns."""
+"""Doubts about a film in sentences: its clock, its orientation, its contact and its turns."""
 
 from __future__ import annotations
 

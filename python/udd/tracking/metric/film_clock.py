@@ -30,7 +30,7 @@ class SlowPart:
 
 
 def slow_parts(t: Array, centre: NDArray[np.complex128], angle: Array) -> list[SlowPart]:
-    """Find parts in which the drive seems slower than in others; the fastest are taken for real time.
+    """Find parts in which the drive seems slower than in others; the fastest parts are treated as real time.
 
     Parameters
     ----------

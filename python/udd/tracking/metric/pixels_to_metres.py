@@ -165,9 +165,10 @@ def _release(t: Array, values: Array, radius: float, drive: complex, unseen_afte
     """Return the time at which the wheels lose the disk [s]; infinity if they do not.
 
     In a step, a disk that rolls goes from a to (a + d (exp(i turn) - 1) dt / (i turn)) exp(-i turn); d is the
-    drive. A falling disk misses this by a velocity that grows with time. The release is where two steps in a
-    row miss the same way, by far more than usual, the second by as much more as gravity makes it; the first
-    one must be near the edge, and its miss says how long the disk has been falling. With `unseen_after`, the
+    drive. A falling disk misses this by a velocity that grows with time. At the release two steps in a row
+    miss in the same direction, by far more than usual; gravity sets the increase from the first to the
+    second. The first one must be near the edge, and its miss gives the time of the fall. With `unseen_after`,
+    the
     disk is not seen after the last step, which counts alone.
     """
     at, turn, step = values[:, 0] + 1j * values[:, 1], np.diff(values[:, 2]), np.diff(t)
@@ -195,8 +196,8 @@ def _release(t: Array, values: Array, radius: float, drive: complex, unseen_afte
 def recount(t: Array, angle: Array) -> tuple[Array, int]:
     """Whole turns across gaps, from the rates of turning on both sides; how many gaps leave doubt.
 
-    A frame shows the angle but for whole turns. Across a gap the mean of the rates before and after
-    decides; where they differ by so much that it could be off by half a turn, the gap is doubtful.
+    A frame shows the angle but for whole turns. Across a gap the mean of the rates before and after decides.
+    If their difference allows an error of half a turn, the gap is doubtful.
     """
     angle, doubtful = angle.copy(), 0
     seen = np.flatnonzero(np.isfinite(angle))

@@ -13,7 +13,7 @@ from udd.tracking.passes.tracks import Tracks
 from .streak_errors import mark_residuals, new_poses, unit_covariance
 
 Array = NDArray[np.float64]
-OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not speak for the others
+OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not count for the others
 ALIKE = 1000.0  # coordinates that stand for a usual frame where frames differ by no more than chance
 GROUP = 40  # frames with like streaks from which their usual disagreement is taken
 
@@ -21,9 +21,9 @@ GROUP = 40  # frames with like streaks from which their usual disagreement is ta
 def covariance(tracks: Tracks, look: DiskAppearance) -> Array:
     """Covariance (n, 3, 3) of (u, v, beta) in pixels and rad, of what moves each mark for itself.
 
-    The fit's own covariance assumes independent pixels of known noise. Compression, lens and light
-    are neither; the marks' disagreement shows by how much, along their streaks and across: a rigid disk
-    leaves 2 m - 3 of the 2 m coordinates of m marks over.
+    The fit's own covariance assumes independent pixels of known noise. Errors by compression, lens and light
+    are neither. The marks' disagreement along and across their streaks shows them: a rigid disk leaves 2 m -
+    3 of the 2 m coordinates of m marks over.
     """
     new, used = new_poses(tracks, look.reach), np.isfinite(tracks.chi2)
     off = mark_residuals(tracks, new)
@@ -31,13 +31,13 @@ def covariance(tracks: Tracks, look: DiskAppearance) -> Array:
     chi2 = np.einsum("nmi,nmij,nmj->nm", off, tracks.marks.astype(float), off)
     total = np.where(used, chi2, 0.0).sum(axis=1)
     usual, belief, group = _usual(total, spare, tracks.streak, new)
-    # a frame's own disagreement counts too, beside that of frames like it as if they were so many coordinates
+    # a frame's disagreement counts with that of similar frames, whose weight is a number of coordinates
     inflation = (belief * usual + total) / (belief + spare)
     return np.asarray(inflation[:, None, None] * unit_covariance(tracks, look, off, group, new))
 
 
 def add_shared_errors(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
-    """The covariance with causes that move all marks together, the centre known to so much.
+    """Add errors that move all marks together, and the error of the centre, to the covariance.
 
     Where the centre is among the marks only the rim says; what it is off by turns with the disk. `shared`
     are standard errors (n, 3) of u, v and beta, signed alike.
@@ -53,9 +53,9 @@ def _usual(
 ) -> tuple[Array, Array, NDArray[np.int_]]:
     """Return the misfit per spare coordinate of frames with like streaks, its weight and their group.
 
-    The weight is a number of coordinates. Only frames with a new pose show it. If each frame's variance
-    is drawn anew, 1 / variance being gamma distributed, the mean given a frame's misfit is that of both; the
-    less they scatter, the more the usual one counts.
+    The weight is a number of coordinates. Only frames with a new pose show it. The frames' variances differ,
+    1 / variance being gamma distributed. The mean of a variance, given the frame's misfit, is a weighted mean
+    of that and the usual one. The less the frames scatter, the more the usual misfit counts.
     """
     out, belief = np.ones(len(total)), np.full(len(total), ALIKE)
     which = np.full(len(total), -1)

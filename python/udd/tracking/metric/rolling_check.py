@@ -17,7 +17,7 @@ REACH = 0.8  # of the radius: the size to compare a contact's uncertainty with
 
 @dataclass(frozen=True)
 class Health:
-    """What is left of the rolling constraint in each frame, (n, 2) [m], NaN where it cannot be judged."""
+    """Residual of the rolling constraint in each frame, (n, 2) [m], NaN if it cannot be judged."""
 
     t: Array
     rest: Array
@@ -28,8 +28,8 @@ class Health:
 def health(m: Measurement) -> Health | None:
     """Check a tracked disk against dY/dT = Z Omega, dZ/dT = -Y Omega + W, in its integrated form.
 
-    None where the motion does not determine contact and drive (too short, or steady rotation). Slip, a
-    clock that is wrong, and a camera that is not what it is taken for leave more than the noise.
+    None where the motion does not determine contact and drive (too short, or steady rotation). Slip, a wrong
+    clock and a wrong model of the camera leave more than the noise.
     """
     good, radius = m.seen, float(m.meta["R"])
     centre = m["Y"] - 1j * m["Z"]

@@ -1,4 +1,4 @@
-"""Errors along a mark's streak and across it, told apart by what the marks of one disk leave over."""
+"""Errors along and across a mark's streak, distinguished by the residuals of the marks of one disk."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from udd.tracking.passes.second_pass import LocalMotion
 from udd.tracking.passes.tracks import Tracks
 
 Array = NDArray[np.float64]
-OUTLIER = 6.0  # times the median square; a mark beyond does not speak for the others
+OUTLIER = 6.0  # times the median square; a mark beyond does not count for the others
 SAME = 0.7  # pixels: the disk is where it was before
 FEWEST = 20  # poses that show how large errors are
 LEAST = 0.05  # share of the misfit that either direction has at least
@@ -49,8 +49,8 @@ def unit_covariance(
 ) -> Array:
     """Covariance (n, 3, 3) of (u, v, beta) for a misfit of 1 per coordinate that is left over.
 
-    Along its streak a mark fades over many pixels, and errors that many pixels share, as those of
-    compression, light and blur are, move it further there than the noise of single pixels lets expect.
+    Along its streak a mark fades over many pixels. Errors that these share, by compression, light and blur,
+    move it further than the noise of single pixels does.
     `off` is what the marks leave over.
     `group` numbers the frames (below 0: none) whose streaks are so alike that the ratio is taken to be, too.
     """
@@ -91,7 +91,7 @@ def _marks(
 
 
 def _left(design: Array) -> Array:
-    """What is left of each coordinate's error, and what others add, when the pose has taken its part."""
+    """Return the matrix from errors of the coordinates to their residuals after the fit of the pose."""
     return np.asarray(np.eye(len(design)) - design @ np.linalg.solve(design.T @ design, design.T))
 
 
@@ -114,7 +114,7 @@ def _ratio(frames: list[tuple[Array, Array]]) -> Array:
 
 
 def _covariance(design: Array, ratio: Array) -> Array:
-    """Of the pose that took coordinates for as good as assumed, at a misfit of 1 per spare coordinate."""
+    """Return the covariance of a pose from its residuals, at a misfit of 1 per spare coordinate."""
     variance = np.tile(ratio, len(design) // 2)
     solved = np.linalg.solve(design.T @ design, design.T)
     spare = len(design) - 3

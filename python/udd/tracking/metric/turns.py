@@ -36,9 +36,9 @@ def count_turns(
 ) -> Turns:
     """Find the whole turns in each gap.
 
-    A frame shows the angle but for whole turns. For each number of these the smoothest way of the angle is
-    found that also takes the centre where it is seen again: a disk that rolls about `pivot` keeps
-    (c - p) exp(-i angle) - d integral exp(-i angle) dt. Its accelerations, against those that the disk has
+    A frame shows the angle but for whole turns. For each number of turns, the smoothest path of the angle is
+    fitted that also brings the centre to its next place: a disk that rolls about `pivot` keeps (c - p) exp(-i
+    angle) - d integral exp(-i angle) dt. Its accelerations, against those that the disk has
     where it is seen, say how well that number does.
 
     Parameters
@@ -85,7 +85,7 @@ def count_turns(
 
 @dataclass(frozen=True)
 class _Way:
-    """What is known about a gap: its length, the rates on both sides, the centre before and after."""
+    """A gap: its length, the rates on both sides, the centre before and after."""
 
     gap: float
     before: float

@@ -61,7 +61,7 @@ def follow(
 ) -> Tracks:
     """Track the disk through `pictures`; one row per picture, flagged where the disk is not tracked.
 
-    After each picture `tick` is told where the disk is in it, NaN where it is not tracked.
+    After each picture `tick` is called with the picture and the pose, NaN if the disk is not tracked.
     """
     frames: list[FrameTrack] = []
     past: list[PoseSample] = []

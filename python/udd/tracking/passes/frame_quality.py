@@ -16,7 +16,7 @@ ENOUGH = 3  # marks: two leave one coordinate to judge by
 
 
 def quality(tracks: Tracks, given: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
-    """The columns of `Measurement.quality`; `given`: frames whose pose stands in the table."""
+    """The columns of `Measurement.quality`; `given`: frames with a pose in the table."""
     used = np.isfinite(tracks.chi2)
     left = tracks.residuals
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -116,7 +116,7 @@ class _Sides:
         copies: NDArray[np.int64] | None = None,
         delayed: bool = True,
     ) -> float | None:
-        """By how much chi2 is less if there are copies; None if that is not clear.
+        """Decrease of chi2 if there are copies; None if that is not clear.
 
         `copies` are frames that are copies or not; None if they are known to be copies, and only the delay is
         in question.

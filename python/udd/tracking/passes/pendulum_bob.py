@@ -202,10 +202,10 @@ def bob_path(film: Film, bob: BobTracker, options: TrackOptions) -> BobPath:
 
 
 def _wandering(at: NDArray[np.complex128], path: Circle) -> float:
-    """Return by how much a bob comes by at different distances from the pivot in the same direction [pixels].
+    """Return the scatter of a bob's distance from the pivot in the same direction [pixels].
 
     Lens and tilt change the distance with the direction only; the lower bob of a double pendulum has another
-    distance each time. Less than the frames' own scatter is 0.
+    distance each time. Scatter within the errors of the frames is 0.
     """
     direction = np.angle((at - path.centre) / (at.mean() - path.centre))
     x = direction / max(float(np.abs(direction).max()), 1e-9)

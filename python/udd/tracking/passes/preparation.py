@@ -275,8 +275,8 @@ def _centred(look: DiskAppearance, centre: complex, options: TrackOptions) -> Di
 def upward(places: NDArray[np.complex128], options: TrackOptions) -> complex:
     """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
 
-    Where all four stand at right angles as nearly as they are known, all four say where beta is, and so do
-    all the marks of any other layout. Of one that is said with an error the first mark says it.
+    If all four are at right angles within their errors, all four define beta, as do all the marks of any
+    other layout. The first mark defines beta of a layout that is given with an error.
     """
     body = options.layout.unit
     if options.sigma.layout and options.calibrate.layout:

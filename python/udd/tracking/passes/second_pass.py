@@ -44,7 +44,7 @@ class Local:
     tracked: bool  # by the first pass
 
     def motion(self, open_for: float) -> Motion:
-        """What the exposure sees of it."""
+        """Return the motion in an exposure."""
         return Motion.of_rates(self.rate, self.spin, self.bending, self.twisting, open_for)
 
 
@@ -124,8 +124,8 @@ def drop_weak(tracks: Tracks) -> Tracks:
 def interpolation_error(tracks: Tracks, variance: float) -> Array:
     """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
 
-    A streak stands for the mean of its path, which is off its middle by half the second derivative times the
-    variance of the time [s^2] over which it is seen. The polynomials that tell this derivative do not know
+    A streak shows the mean of its path. The distance from its middle is half the second derivative times the
+    variance of the time [s^2] of the exposure. The polynomials that tell this derivative do not know
     what happens between frames; how far they miss the frame itself when it is left out shows how much.
     """
     around = LocalMotion(tracks)
@@ -137,8 +137,9 @@ def interpolation_error(tracks: Tracks, variance: float) -> Array:
 def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array:
     """Covariances (n, 3, 3) of poses in the middle of paths whose bending poses with those errors told.
 
-    What the mean of a path is off its middle by is taken off, half the second derivative times `variance`
-    [s^2]. That derivative has the errors of the frame itself, against the sign, and of its neighbours: of a
+    The distance of a path's mean from its middle, half the second derivative times `variance` [s^2], is
+    subtracted. That derivative has the errors of the frame itself, against the sign, and of its neighbours:
+    of a
     shutter that is open all the time they make the pose worse by a tenth.
     """
     around, out = LocalMotion(tracks), covariance.copy()
@@ -170,7 +171,7 @@ class LocalMotion:
         return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], tracked
 
     def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
-        """How far centre and angle are from what the neighbours alone foretell; 0 where these are too few."""
+        """Return how centre and angle differ from the neighbours' prediction; 0 if these are too few."""
         near, x, _ = self._near(k)
         others = near != k
         if others.all() or others.sum() < 2:

@@ -178,7 +178,7 @@ def _laid(
 
 
 def _displaced(points: Complexes, places: Complexes) -> Complexes:
-    """By how much the marks stand off their places, the mean over frames in the frame of the body."""
+    """Return the mean offset of the marks from their places, in the frame of the body."""
     off = np.full(points.shape, complex(np.nan, np.nan))
     for row, at in zip(off, points, strict=True):
         ok = np.isfinite(at)

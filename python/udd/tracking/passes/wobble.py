@@ -138,5 +138,5 @@ def _excess(strain: Array, axis: float) -> float:
 
 
 def _floor(strain: Array, axis: float) -> float:
-    """What varies without being a wobble."""
+    """Return the variation that is no wobble."""
     return float(_variances(strain, axis)[1].max())

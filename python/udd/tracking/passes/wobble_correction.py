@@ -1,4 +1,4 @@
-"""A wobbling disk as if it did not: each frame's foreshortening, told by its marks, is undone."""
+"""Correction of a wobbling disk: the marks show each frame's foreshortening, which is undone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class WobbleCorrection:
     tracks: Tracks
     look: DiskAppearance
     across: complex  # direction of the foreshortening
-    short: Array  # (n,) by how much each frame is, below 0
+    short: Array  # (n,) relative change of each frame's length, below 0
     sigma: Array  # (n,) its standard error
     answer: Array  # (n, 3) change of the pose (u, v, beta) that a foreshortening of 1 made
     tracked: NDArray[np.bool_]
@@ -69,8 +69,9 @@ def correct_wobble(
 ) -> WobbleCorrection | None:
     """Each frame's foreshortening by what its pose left over; None where no frame shows all marks.
 
-    Along the axis of its turning the disk is not foreshortened: by how much the marks are further apart there
-    than they were learned, by so much what was learned is too small. And they were learned from frames in
+    The disk is not foreshortened along the axis of its turning: if the marks are further apart there than
+    they were learned, the learned distances are too small by the same factor. And they were learned from
+    frames in
     which they were displaced. `before`: what the marks that the tracks come from were displaced for.
     """
     across = complex(np.exp(1j * found.axis))
@@ -85,7 +86,7 @@ def correct_wobble(
     usual, prior = -(found.amplitude**2) / 4, found.amplitude**4 / SINE  # mean and variance of cos(A sin) - 1
 
     def further(k: int, places: Complexes) -> tuple[Array, Array, float, float]:
-        """Of a frame, its marks at `places`: change of pose, leftover, more foreshortening, its precision."""
+        """Return change of pose, residual, change of foreshortening and its precision for marks."""
         f = frames[k]
         change, explained = f.response(f.turn * (places - look.places))
         by, rest = f.response(f.across(across))
@@ -118,7 +119,7 @@ def correct_wobble(
 
 @dataclass(frozen=True)
 class _Frame:
-    """What a rigid pose left over of one frame's marks, and how their displacements move that pose."""
+    """Return the residuals of a frame's marks after a rigid pose, and the pose's change by each."""
 
     turn: complex
     arms: Complexes
