@@ -213,9 +213,9 @@ def render(
         numbers.tolist(),
     )
     times = real[numbers]
-    held = shown[numbers] <= t[-1]
+    on_wheels = shown[numbers] <= t[-1]
     state = motion(shown[numbers])
-    return Film(target, times, state, held, view.size, view.scale, view.pivot, radius)
+    return Film(target, times, state, on_wheels, view.size, view.scale, view.pivot, radius)
 
 
 def frame_times(t: Array, camera: Camera, after: float = 0.0) -> Array:

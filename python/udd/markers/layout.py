@@ -157,8 +157,8 @@ def read_bob(said: Any) -> Layout:
 
 def _check(layout: Layout) -> None:
     places = np.array(layout.places)
-    apart = np.abs(places[:, None] - places[None, :]) + np.eye(len(places)) * 1e9
-    if apart.min() < 0.05 * layout.reach:
+    distance = np.abs(places[:, None] - places[None, :]) + np.eye(len(places)) * 1e9
+    if distance.min() < 0.05 * layout.reach:
         raise TrackError("layout: two marks are in the same place")
     for number, chroma in enumerate(np.hypot(*layout.chroma.T), start=1):
         if chroma < PALEST:
@@ -173,8 +173,8 @@ def _check(layout: Layout) -> None:
         if k == first or abs(abs(middle[k]) - abs(middle[first])) > 2 * SLACK * layout.reach:
             continue
         turned = middle * middle[k] / middle[first]
-        near = (np.abs(turned[:, None] - middle[None, :]) < SLACK * layout.reach) & alike
-        if near.any(axis=1).all():
+        close = (np.abs(turned[:, None] - middle[None, :]) < SLACK * layout.reach) & alike
+        if close.any(axis=1).all():
             raise TrackError("layout: the marks look the same when the disk is turned; use another colour")
 
 

@@ -74,10 +74,10 @@ def dictionary(name: str) -> Any:
     """OpenCV's dictionary of that name, without its DICT_."""
     import cv2
 
-    known = {d.removeprefix("DICT_").lower(): d for d in dir(cv2.aruco) if d.startswith("DICT_")}
-    if name.lower() not in known:
-        raise TrackError(f"layout: there is no dictionary {name!r} of tags; there are {', '.join(known)}")
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, known[name.lower()]))
+    names = {d.removeprefix("DICT_").lower(): d for d in dir(cv2.aruco) if d.startswith("DICT_")}
+    if name.lower() not in names:
+        raise TrackError(f"layout: there is no dictionary {name!r} of tags; there are {', '.join(names)}")
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, names[name.lower()]))
 
 
 def cells_of(tag: Tag) -> NDArray[np.uint8]:

@@ -40,7 +40,7 @@ class Sigma:
     layout: float = 0.0
 
 
-def _told(kind: str, note: str = "") -> dict[str, str]:
+def _entry(kind: str, note: str = "") -> dict[str, str]:
     """Return the form of an option in a config file, and the remark with which one is written."""
     return {"kind": kind, "note": note}
 
@@ -65,52 +65,52 @@ class TrackOptions:
         The layout's printed tags, empty for coloured marks.
     """
 
-    disk_radius: float = field(default=0.08, metadata=_told("a positive number of metres", "m"))
-    mark_distance: float | None = field(default=None, metadata=_told("a positive number of metres", "m"))
+    disk_radius: float = field(default=0.08, metadata=_entry("a positive number of metres", "m"))
+    mark_distance: float | None = field(default=None, metadata=_entry("a positive number of metres", "m"))
     fps: Rates | None = field(
-        default=None, metadata=_told("a positive number of frames per second", "frames per second")
+        default=None, metadata=_entry("a positive number of frames per second", "frames per second")
     )
     pivot: tuple[float, float] | None = field(
         default=None,
-        metadata=_told("two numbers of pixels [u, v]", "where the wheels hold the disk, pixels (u, v down)"),
+        metadata=_entry("two numbers of pixels [u, v]", "where the wheels hold the disk, pixels (u, v down)"),
     )
-    refine: bool = field(default=True, metadata=_told("true or false"))
+    refine: bool = field(default=True, metadata=_entry("true or false"))
     scale: float | None = field(
-        default=None, metadata=_told("a positive number of pixels per metre", "pixels per metre")
+        default=None, metadata=_entry("a positive number of pixels per metre", "pixels per metre")
     )
     region: Region | None = field(
         default=None,
-        metadata=_told(
+        metadata=_entry(
             "four numbers of pixels [u0, v0, u1, v1]",
             "u0, v0, u1, v1: nothing outside is looked at, pixels",
         ),
     )
     layout: Layout = field(
         default=STANDARD,
-        metadata=_told(
+        metadata=_entry(
             "a list of marks", "m right of and above the disk's centre when beta is 0; sRGB codes"
         ),
     )
     calibrate: Calibrate = field(
         default=Calibrate(),
-        metadata=_told("a table", "true: found in the film; false: as given, or not there"),
+        metadata=_entry("a table", "true: found in the film; false: as given, or not there"),
     )
     sigma: Sigma = field(
         default=Sigma(),
-        metadata=_told(
+        metadata=_entry(
             "a table of standard errors",
             "standard errors of what is given (pixels, pixels per metre, m): the film improves it",
         ),
     )
     apart: MarkSeparation | None = field(
         default=None,
-        metadata=_told(
+        metadata=_entry(
             "two marks' numbers and a distance",
             "two marks, by their numbers from 1, and how far apart their middles are, m",
         ),
     )
-    bob: Any = field(default=None, metadata=_told("the colour of a pendulum's bob"))
-    length: float | None = field(default=None, metadata=_told("a positive number of metres", "m"))
+    bob: Any = field(default=None, metadata=_entry("the colour of a pendulum's bob"))
+    length: float | None = field(default=None, metadata=_entry("a positive number of metres", "m"))
     tags: tuple[Tag, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:

@@ -64,7 +64,7 @@ class Tracking:
 
     measurement: Measurement
     tracks: Tracks
-    known: TrackerState
+    state: TrackerState
     camera: Camera
     outline: Rim | None
 
@@ -167,7 +167,7 @@ def track(
     >>> m = udd.track("run.mp4", layout=[tag])  # doctest: +SKIP
     >>> swing = udd.track("clock.mp4", bob="red", length=0.8)  # doctest: +SKIP
     """
-    found = run_tracker(
+    result = run_tracker(
         video,
         config=config,
         progress=progress,
@@ -181,7 +181,7 @@ def track(
         bob=bob,
         **more,
     )
-    return found.measurement if isinstance(found, Tracking) else found
+    return result.measurement if isinstance(result, Tracking) else result
 
 
 def run_tracker(
@@ -211,10 +211,10 @@ def track_disk(
     **given: Any,
 ) -> Tracking:
     """Track a disk, return also the poses in pixels; `watch` is called with each frame."""
-    found = run_tracker(video, progress=progress, watch=watch, **given)
-    if not isinstance(found, Tracking):
+    result = run_tracker(video, progress=progress, watch=watch, **given)
+    if not isinstance(result, Tracking):
         raise TrackError("a pendulum's film has no marks, so there is no detail; use udd.track")
-    return found
+    return result
 
 
 def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractContextManager[Count]:
@@ -224,12 +224,12 @@ def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractCont
 def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
     """Track coloured marks: survey, calibrate, follow, refine, convert to metres, flag."""
     look_over, camera = steadied(film, survey(film))
-    found = _measured(film, look_over, camera, options, progress, watch)
-    if _retimed(film, found):
-        found = _measured(film, survey(film), camera, options, progress, watch)
-    turns = quarter_turns(_gravity(found.measurement), found.camera)
+    result = _measured(film, look_over, camera, options, progress, watch)
+    if _retimed(film, result):
+        result = _measured(film, survey(film), camera, options, progress, watch)
+    turns = quarter_turns(_gravity(result.measurement), result.camera)
     if not turns:
-        return _with_doubts(film, found)
+        return _with_doubts(film, result)
     film.correct = applied(film).then_turned(turns)
     film_is = "upside down" if turns == 2 else "on its side"
     warnings.warn(f"{film.path}: the film is {film_is}; it is turned upright", stacklevel=outside())
@@ -237,9 +237,9 @@ def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: W
     return _with_doubts(film, _measured(film, survey(film), camera, options, progress, watch))
 
 
-def _retimed(film: Film, found: Tracking) -> bool:
+def _retimed(film: Film, result: Tracking) -> bool:
     """Return True if the drive shows that parts are slowed down; the clock then follows the drive."""
-    tracks = found.tracks
+    tracks = result.tracks
     parts = [] if film.forced or film.slower else slow_parts(tracks.t, tracks.centre, tracks.angle)
     if not parts:
         return False
@@ -254,14 +254,14 @@ def _gravity(m: Measurement) -> ApparentGravity | None:
     return apparent_gravity(m.t, m.values, float(m.meta["R"]))
 
 
-def _with_doubts(film: Film, found: Tracking) -> Tracking:
+def _with_doubts(film: Film, result: Tracking) -> Tracking:
     """Add the doubts about a film to the header of its measurement, and warn of each."""
-    m, gravity = found.measurement, _gravity(found.measurement)
-    said = doubts(gravity, found.camera, film.fps, int(m.meta["turns_doubtful"]))
+    m, gravity = result.measurement, _gravity(result.measurement)
+    said = doubts(gravity, result.camera, film.fps, int(m.meta["turns_doubtful"]))
     for doubt in said:
         warnings.warn(f"{film.path}: {doubt}", stacklevel=outside())
     shown = {} if gravity is None else {"gravity_seen": abs(gravity.value), "gravity_sigma": gravity.sigma}
-    return replace(found, measurement=m.with_meta(**shown, **({"doubts": said} if said else {})))
+    return replace(result, measurement=m.with_meta(**shown, **({"doubts": said} if said else {})))
 
 
 def _measured(
@@ -275,15 +275,15 @@ def _measured(
     """Run the tracker once over a film with its present corrections."""
     there = recognise(film, look_over, options)
     look_over, options = there.look_over, there.options
-    known, rim = prepare(film, look_over, there.sights, there.seen, options, there.clear)
-    tracks = _follow(film, known, look_over.frames, progress, watch)
+    state, rim = prepare(film, look_over, there.sights, there.seen, options, there.clear)
+    tracks = _follow(film, state, look_over.frames, progress, watch)
     # with a known contact the paths were curved, and poses lie in their middle
-    tracks = _unwrap(tracks, known.exposure if known.contact is None else 0.0)
+    tracks = _unwrap(tracks, state.exposure if state.contact is None else 0.0)
     if options.refine:
-        known = recalibrate(known, look_over, tracks, options)
-        tracks = _refine(film, known, tracks, progress)
+        state = recalibrate(state, look_over, tracks, options)
+        tracks = _refine(film, state, tracks, progress)
     tracks = drop_weak(tracks)
-    return _to_metres(film, tracks, known, options, rim, options.refine, look_over, camera)
+    return _to_metres(film, tracks, state, options, rim, options.refine, look_over, camera)
 
 
 def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
@@ -291,8 +291,8 @@ def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Wa
     frames = film.promised or film.packets
     with _bar(film, frames, "track", progress) as bar:
         tell = _teller(film, DiskAppearance([], 0.0, 1.0, film.light, np.inf), frames, bar, watch)
-        tracks, known = follow_tags(film, film.pictures(), options, tell)
-    return _with_doubts(film, _to_metres(film, _unwrap(tracks, known.exposure), known, options, None, False))
+        tracks, state = follow_tags(film, film.pictures(), options, tell)
+    return _with_doubts(film, _to_metres(film, _unwrap(tracks, state.exposure), state, options, None, False))
 
 
 def _teller(
@@ -321,7 +321,7 @@ class _Upright:
     """Poses of a disk that stays in its plane, with camera, rim and shared errors."""
 
     tracks: Tracks
-    known: TrackerState
+    state: TrackerState
     camera: Camera
     rim: Rim | None
     wobble: Wobble
@@ -331,7 +331,7 @@ class _Upright:
 def _to_metres(
     film: Film,
     tracks: Tracks,
-    known: TrackerState,
+    state: TrackerState,
     options: TrackOptions,
     rim: Rim | None,
     twice: bool,
@@ -342,10 +342,10 @@ def _to_metres(
     if moved is not None and not moved.steady:
         why = lost("the background is not seen, and the camera moves")
         tracks = tracks.without(~moved.known[: len(tracks)], why)
-    disk = _upright(film, tracks, known, options, rim, twice, look_over)
+    disk = _upright(film, tracks, state, options, rim, twice, look_over)
     tracks, camera = disk.tracks, disk.camera
     drive = complex(np.conj(camera.drive)) * camera.scale
-    turns = count_turns(tracks.t, tracks.centre, tracks.angle, camera.pivot, drive, disk.known.look.reach)
+    turns = count_turns(tracks.t, tracks.centre, tracks.angle, camera.pivot, drive, disk.state.look.reach)
     tracks = replace(tracks, angle=turns.angle)
     # where the layout is taken as said, so is the centre
     by_hand = 0.0 if rim is not None and options.calibrate.layout else options.sigma.layout
@@ -356,10 +356,10 @@ def _to_metres(
         centre_sigma = disk.rim.centre_sigma
     if moved is not None and not moved.steady:
         disk = replace(disk, shared=[*disk.shared, *moved.errors(tracks.centre)])
-    own = to_mid_exposure(tracks, covariance(tracks, disk.known.look), disk.known.exposure**2 / 12)
-    alike = common_mode_errors(tracks, add_shared_errors(own, 0.0, disk.shared), camera)
+    own_errors = to_mid_exposure(tracks, covariance(tracks, disk.state.look), disk.state.exposure**2 / 12)
+    alike = common_mode_errors(tracks, add_shared_errors(own_errors, 0.0, disk.shared), camera)
     shared = [*disk.shared, *(alike[:, None] * np.eye(3)[axis] for axis in (0, 1))]  # u and v: two causes
-    values, sigma, rho = metres(tracks, add_shared_errors(own, centre_sigma, shared), camera)
+    values, sigma, rho = metres(tracks, add_shared_errors(own_errors, centre_sigma, shared), camera)
     gone = left_the_wheels(tracks.t, values, options.disk_radius, camera.pivot_sigma, camera.drive)
     # all frames share the error of a centre that was given: it makes none of them vague
     spread = (sigma[:, :2] ** 2).sum(axis=1) - 2 * by_hand**2
@@ -368,7 +368,7 @@ def _to_metres(
         table[gone | vague] = np.nan
     flags = [GONE if g else VAGUE if v else f for g, v, f in zip(gone, vague, tracks.flag, strict=True)]
     tracks = replace(tracks, flag=tuple(flags))
-    meta = meta_of(film, tracks, disk.known, camera, options, len(turns.doubtful), disk.wobble)
+    meta = meta_of(film, tracks, disk.state, camera, options, len(turns.doubtful), disk.wobble)
     seen_how = quality(tracks, np.asarray(np.isfinite(values).all(axis=1)))
     correct = applied(film)
     meta |= correct.meta
@@ -384,13 +384,13 @@ def _to_metres(
         check_length(m)
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}") from None
-    return Tracking(m, tracks, disk.known, camera, disk.rim)
+    return Tracking(m, tracks, disk.state, camera, disk.rim)
 
 
 def _upright(
     film: Film,
     tracks: Tracks,
-    known: TrackerState,
+    state: TrackerState,
     options: TrackOptions,
     rim: Rim | None,
     twice: bool,
@@ -399,28 +399,28 @@ def _upright(
     """Find scale and contact, and undo a wobble if there is one."""
 
     def camera() -> Camera:
-        return camera_of(tracks, known, size_of(known.look.places, rim, options), options)
+        return camera_of(tracks, state, size_of(state.look.places, rim, options), options)
 
     before = camera()
-    shared = [interpolation_error(tracks, known.exposure**2 / 12)]
-    turned = wobble(tracks, known.look)
-    stood = correct_wobble(tracks, known.look, turned) if turned.amplitude else None
+    shared = [interpolation_error(tracks, state.exposure**2 / 12)]
+    turned = wobble(tracks, state.look)
+    stood = correct_wobble(tracks, state.look, turned) if turned.amplitude else None
     if stood is None:
-        return _Upright(tracks, known, before, rim, turned, shared)
+        return _Upright(tracks, state, before, rim, turned, shared)
     if twice:  # a mark is placed best where it is looked for ("wobble": 7 rather than 35 micrometres)
-        known = replace(known, look=stood.look)
-        tracks = second_pass(film.pictures(), known, stood.tracks, look_at=stood.look_at)
-        stood = correct_wobble(tracks, known.look, turned, stood) or stood
+        state = replace(state, look=stood.look)
+        tracks = second_pass(film.pictures(), state, stood.tracks, look_at=stood.look_at)
+        stood = correct_wobble(tracks, state.look, turned, stood) or stood
     if rim is not None and options.calibrate.layout and look_over is not None:
-        rim = _rim_upright(look_over, stood, known, rim, options)
+        rim = _rim_upright(look_over, stood, state, rim, options)
         stood = stood.centred(rim.centre, upward(stood.look.places - rim.centre, options))
     tracks, lean = stood.about(before.pivot)
-    known = replace(known, look=stood.look)
-    return _Upright(tracks, known, camera(), rim, turned, [*shared, lean])
+    state = replace(state, look=stood.look)
+    return _Upright(tracks, state, camera(), rim, turned, [*shared, lean])
 
 
 def _rim_upright(
-    look_over: Survey, stood: WobbleCorrection, known: TrackerState, rim: Rim, options: TrackOptions
+    look_over: Survey, stood: WobbleCorrection, state: TrackerState, rim: Rim, options: TrackOptions
 ) -> Rim:
     """Measure the rim again, from frames with a known foreshortening; its centre from its former place."""
     tracks, around = stood.tracks, LocalMotion(stood.tracks)
@@ -428,26 +428,26 @@ def _rim_upright(
     for picture in look_over.pictures:
         here = around.at(picture.index) if picture.index < len(tracks) else None
         if here is not None and here.tracked:
-            frames.append((picture, here.pose, here.motion(known.exposure)))
+            frames.append((picture, here.pose, here.motion(state.exposure)))
     frames.sort(key=lambda f: stood.look.streak(f[2]))
     frames = frames[:SHARP]
     short = [float(stood.short[picture.index]) for picture, _, _ in frames]
     try:
-        return outline(frames, stood.look, known.view, rim_span(options), short=short, across=stood.across)
+        return outline(frames, stood.look, state.view, rim_span(options), short=short, across=stood.across)
     except TrackError:  # it was seen once, but not now
         return replace(rim, centre=0j)
 
 
-def _follow(film: Film, known: TrackerState, frames: int, progress: Progress, watch: Watch | None) -> Tracks:
+def _follow(film: Film, state: TrackerState, frames: int, progress: Progress, watch: Watch | None) -> Tracks:
     with _bar(film, frames, "track", progress) as bar:
-        return follow(film.pictures(), known, _teller(film, known.look, frames, bar, watch))
+        return follow(film.pictures(), state, _teller(film, state.look, frames, bar, watch))
 
 
-def _refine(film: Film, known: TrackerState, tracks: Tracks, progress: Progress) -> Tracks:
+def _refine(film: Film, state: TrackerState, tracks: Tracks, progress: Progress) -> Tracks:
     streaks = (tracks.streak > LONG).any() or any(is_lost(flag) for flag in tracks.flag)
     for streaks_only in (False, True) if streaks else (False,):
         with _bar(film, len(tracks), "refine", progress) as bar:
-            tracks = second_pass(film.pictures(), known, tracks, lambda _: bar.update(), streaks_only)
+            tracks = second_pass(film.pictures(), state, tracks, lambda _: bar.update(), streaks_only)
     return tracks
 
 
@@ -460,17 +460,17 @@ def pictures_at(
     turned upright.
     """
     wanted = {int(i) for i in frames}
-    found: dict[int, NDArray[np.uint8]] = {}
+    images: dict[int, NDArray[np.uint8]] = {}
     film = _as_tracked(video, tracked)
     for picture in film.pictures():
         if picture.index in wanted:
-            found[picture.index] = rgb(picture, film.full_range)
-            if len(found) == len(wanted):
+            images[picture.index] = rgb(picture, film.full_range)
+            if len(images) == len(wanted):
                 break
-    lost = wanted - set(found)
+    lost = wanted - set(images)
     if lost:
         raise TrackError(f"{video}: there is no frame {min(lost)}")
-    return [found[int(i)] for i in frames]
+    return [images[int(i)] for i in frames]
 
 
 def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> Film:

@@ -15,8 +15,8 @@ def rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
     h, w = picture.y.shape
     if not full_range and h % 2 == w % 2 == 0:  # OpenCV knows these: twenty times faster
         codes = np.concatenate([picture.y.ravel(), picture.u.ravel(), picture.v.ravel()])
-        known = cv2.cvtColor(codes.reshape(h * 3 // 2, w), cv2.COLOR_YUV2RGB_I420)
-        return np.asarray(known, dtype=np.uint8)
+        converted = cv2.cvtColor(codes.reshape(h * 3 // 2, w), cv2.COLOR_YUV2RGB_I420)
+        return np.asarray(converted, dtype=np.uint8)
     y, u, v = (
         cv2.resize(p, (w, h), interpolation=cv2.INTER_LINEAR).astype(np.float32)
         for p in (picture.y, picture.u, picture.v)

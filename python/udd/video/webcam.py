@@ -227,11 +227,11 @@ class _Shots:
     def __iter__(self) -> Iterator[tuple[float, NDArray[np.uint8]]]:
         raw = self._raw()
         probe = list(islice(raw, PROBE))
-        if np.any(np.diff([own for own, _, _ in probe]) <= 0):  # it knows no time, or not for each frame
+        if np.any(np.diff([clock for clock, _, _ in probe]) <= 0):  # it knows no time, or not for each frame
             self.clock = "computer"
         with progress_bar(self.seconds, "s", self.progress, title=f"record {self.name}", leave=True) as bar:
-            for own, arrived, picture in chain(probe, raw):
-                t = own if self.clock == "camera" else arrived
+            for clock, arrived, picture in chain(probe, raw):
+                t = clock if self.clock == "camera" else arrived
                 if self.t and t - self.t[-1] < 1 / (RATE * TICKS):
                     continue  # a time that stands still shows no new instant
                 if self.by_hand.asked or (self.t and t - self.t[0] > self.seconds):

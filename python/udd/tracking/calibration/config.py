@@ -35,13 +35,13 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
     {'disk_radius': 0.075, 'pivot': (275.0, 310.5)}
     """
     where, said = as_said(config)
-    found = {}
+    entries = {}
     for key, value in table(f"{where}: a config", said, FIELDS, error=TrackError).items():
         try:
-            found[key] = read_option(key, value)
+            entries[key] = read_option(key, value)
         except TrackError as error:
             raise TrackError(f"{where}: {error}") from None
-    return {**found, **{key: value for key, value in given.items() if value is not None}}
+    return {**entries, **{key: value for key, value in given.items() if value is not None}}
 
 
 def read_options(config: Config | TrackOptions | None, **given: Any) -> TrackOptions:

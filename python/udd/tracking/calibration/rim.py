@@ -75,34 +75,34 @@ def turning_circle(
 
     All of a frame's points may be shifted alike in the picture, by as much in every frame.
     """
-    found = np.array([0.0, 0.0, 0.0, 0.0, np.median(np.abs(points))])  # centre, shift in the picture, radius
-    known = np.diag([0.0, 0.0, SHIFT**-2, SHIFT**-2, 0.0])
+    fitted = np.array([0.0, 0.0, 0.0, 0.0, np.median(np.abs(points))])  # centre, shift in the picture, radius
+    prior = np.diag([0.0, 0.0, SHIFT**-2, SHIFT**-2, 0.0])
     for _ in range(ROUNDS):
-        design, rest, spread = _radial(points, turned, found)
+        design, rest, spread = _radial(points, turned, fitted)
         far = (rest / (2 * spread)) ** 2
         pull = (rest / (1 + far) / spread**2)[:, None] * design  # what is far off pulls less
-        normal = design.T @ (design / (1 + far[:, None])) / spread**2 + known
-        change = np.linalg.solve(normal, pull.sum(axis=0) - known @ found)
-        found = found + change
+        normal = design.T @ (design / (1 + far[:, None])) / spread**2 + prior
+        change = np.linalg.solve(normal, pull.sum(axis=0) - prior @ fitted)
+        fitted = fitted + change
         if np.abs(change).max() < 1e-6:
             break
     # frames are the independent pieces: edges within one share the light and the compression
     frames = np.unique(frame)
     pulls = np.array([pull[frame == k].sum(axis=0) for k in frames])
     stiff = (1 - far) / (1 + far) ** 2 / spread**2  # how a point's pull changes with its distance
-    inverse = np.linalg.inv(design.T @ (stiff[:, None] * design) + known)
-    variance = np.diag(inverse @ (pulls.T @ pulls + known) @ inverse) if len(frames) > 1 else np.full(5, 0.25)
+    inverse = np.linalg.inv(design.T @ (stiff[:, None] * design) + prior)
+    variance = np.diag(inverse @ (pulls.T @ pulls + prior) @ inverse) if len(frames) > 1 else np.full(5, 0.25)
     off, sigma = float(np.sqrt(variance[:2].mean())), max(float(np.sqrt(variance[4])), LEAST)
-    return Rim(complex(found[0], found[1]), float(found[4]), sigma, off, len(points))
+    return Rim(complex(fitted[0], fitted[1]), float(fitted[4]), sigma, off, len(points))
 
 
 def _radial(
-    points: NDArray[np.complex128], turned: NDArray[np.complex128], found: NDArray[np.float64]
+    points: NDArray[np.complex128], turned: NDArray[np.complex128], circle: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """How centre, shift and radius move each point's distance from the circle; that distance; its scatter."""
-    arm = points - complex(found[0], found[1]) - complex(found[2], found[3]) / turned
+    arm = points - complex(circle[0], circle[1]) - complex(circle[2], circle[3]) / turned
     body = arm / np.abs(arm)
-    picture, rest = body * turned, np.abs(arm) - found[4]
+    picture, rest = body * turned, np.abs(arm) - circle[4]
     design = np.column_stack([body.real, body.imag, picture.real, picture.imag, np.ones(len(rest))])
     return design, rest, max(1.48 * float(np.median(np.abs(rest - np.median(rest)))), 0.02)
 
@@ -140,8 +140,8 @@ def _rim(
     if not len(rows):
         return out
     # profile and view about each ray's steepest fall
-    near = rows[:, None], k[rows, None] + np.arange(-2 * n, 2 * n)[None, :]
-    part, open_ = profile[near], clear[near].all(axis=1)
+    window = rows[:, None], k[rows, None] + np.arange(-2 * n, 2 * n)[None, :]
+    part, open_ = profile[window], clear[window].all(axis=1)
     inner, outer = np.median(part[:, :n], axis=1), np.median(part[:, 3 * n :], axis=1)
     half = (inner + outer) / 2
     below = part[:, n : 3 * n + 1] < half[:, None]

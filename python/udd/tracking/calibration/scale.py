@@ -107,5 +107,5 @@ def _by_marks(places: NDArray[np.complex128], options: TrackOptions) -> Scale:
     spare = 2 * len(places) - 4
     value = abs(factor)
     glued = float(np.sqrt((np.abs(rest) ** 2).sum() / spare)) if spare else BY_HAND * value
-    known = np.hypot(PLACED, options.sigma.layout * value)
-    return Scale(value, float(np.hypot(glued, known) / np.sqrt(square)), "marks")
+    sigma = np.hypot(PLACED, options.sigma.layout * value)
+    return Scale(value, float(np.hypot(glued, sigma) / np.sqrt(square)), "marks")

@@ -162,9 +162,9 @@ def locate_bob(picture: Picture, behind: Background, colour: BobColour) -> Blob 
         return None
     full = np.median(change[solid > 0], axis=0)
     share = np.clip(change @ full / float(full @ full), 0, 1.1)
-    near = cv2.dilate((share > SHARE).astype(np.uint8) & cv2.dilate(solid, np.ones((3, 3), np.uint8)),
+    close = cv2.dilate((share > SHARE).astype(np.uint8) & cv2.dilate(solid, np.ones((3, 3), np.uint8)),
                       np.ones((7, 7), np.uint8))  # fmt: skip
-    weight = np.where(near > 0, share, 0).astype(np.float64)
+    weight = np.where(close > 0, share, 0).astype(np.float64)
     area = float(weight.sum())
     v, u = np.mgrid[r0:r1, c0:c1]
     cu, cv = (weight * u).sum() / area, (weight * v).sum() / area

@@ -206,9 +206,9 @@ class Background:
         self.light, self.first = light.astype(np.float32), first
         height, width = first.shape
         self.middle = complex(width - 1, height - 1) / 2
-        apart = max(5, round((height * width / 8000) ** 0.5))
-        found = cv2.goodFeaturesToTrack(first, POINTS, 0.005, apart, blockSize=5)
-        self._use(np.asarray([] if found is None else found, np.float32).reshape(-1, 2))
+        spacing = max(5, round((height * width / 8000) ** 0.5))
+        corners = cv2.goodFeaturesToTrack(first, POINTS, 0.005, spacing, blockSize=5)
+        self._use(np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2))
         self.view = (1 + 0j, 0j)  # the last that is known
         self.failed = 0  # pictures in a row whose view was not found
 
@@ -218,14 +218,14 @@ class Background:
 
     def learned(self, pictures: Sequence[Picture]) -> bool:
         """Keep the points that go with most others in most pictures; False if there are too few."""
-        votes, squares, known = np.zeros(len(self.points)), np.zeros(len(self.points)), 0
+        votes, squares, count = np.zeros(len(self.points)), np.zeros(len(self.points)), 0
         for picture in pictures[:: max(1, len(pictures) // LEARNED)]:
-            found = self._seen(picture.y)
-            if found is not None:
-                known += 1
-                votes[found.used] += 1
-                squares[found.used] += np.abs(found.rest) ** 2
-        keep = votes > OFTEN * max(known, 1)
+            view = self._seen(picture.y)
+            if view is not None:
+                count += 1
+                votes[view.used] += 1
+                squares[view.used] += np.abs(view.rest) ** 2
+        keep = votes > OFTEN * max(count, 1)
         self._use(self.points[keep], np.sqrt(squares[keep] / votes[keep] + LEAST**2))
         self.view = (1 + 0j, 0j)
         return len(self.points) >= FEWEST
@@ -234,8 +234,8 @@ class Background:
         """Return the view of each picture."""
         rows: list[Row] = []
         for picture in pictures:
-            found = None if unusable(picture) else self._seen(picture.y)
-            rows.append(NOWHERE if found is None else found.row)
+            view = None if unusable(picture) else self._seen(picture.y)
+            rows.append(NOWHERE if view is None else view.row)
         factor, shift, gain, sigma = zip(*rows, strict=True)
         return _about_median(
             CameraMotion(np.array(factor), np.array(shift), np.array(gain), np.array(sigma), self.middle)
@@ -244,10 +244,10 @@ class Background:
     def _seen(self, y: Plane) -> _Seen | None:
         """One picture's view, and the points that show it; None where too few agree."""
         for factor, shift, steadied in self._guesses(y):
-            found = self._follow(steadied)
-            if found is None:
+            points = self._follow(steadied)
+            if points is None:
                 continue
-            used, there = found
+            used, there = points
             more, away, rest, sigma = _similar(
                 self.points[used].astype(float) @ [1, 1j],
                 there.astype(float) @ [1, 1j],

@@ -65,7 +65,7 @@ def candidates(patches: list[Blobs], look: DiskAppearance, guess: Pose | None) -
     patches = [Blobs(look.lens.plane(p.centre), p.area) for p in patches]
     places = np.array([m.place for m in look.marks])
     reach = look.reach
-    found: list[tuple[float, Pose]] = []
+    poses: list[tuple[float, Pose]] = []
     for i, j in combinations(range(len(places)), 2):
         arm = places[j] - places[i]
         for a in patches[i].centre:
@@ -87,9 +87,9 @@ def candidates(patches: list[Blobs], look: DiskAppearance, guess: Pose | None) -
                             np.angle(np.exp(1j * (p.angle - guess.angle)))
                         )
                         score -= 0.8 * min(away / reach, 1.0)
-                    found.append((score, p))
-    found.sort(key=lambda item: -item[0])
-    return [pose for _, pose in found]
+                    poses.append((score, p))
+    poses.sort(key=lambda item: -item[0])
+    return [pose for _, pose in poses]
 
 
 def _support(

@@ -100,15 +100,15 @@ def squares(
     m2 = ((orange[:, None] + green[None, :]) / 2).reshape(1, -1)
     size = np.abs(d1) + 1e-9
     misfit = np.maximum(np.abs(m1 - m2) / size, np.abs(d1 - d2) / size)
-    found = []
+    sights = []
     for i, j in np.argwhere(misfit < slack):
         a, c = divmod(int(i), len(blue))
         b, d = divmod(int(j), len(green))
         area = np.array([p.area[k] for p, k in zip(patches, (a, b, c, d), strict=True)])
         sight = _sight(complex(m1[i, 0] + m2[0, j]) / 2, complex(d1[i, 0] + d2[0, j]) / 4, 0, area)
         if sight is not None:
-            found.append((float(misfit[i, j]), sight))
-    return sorted(found, key=lambda item: item[0])
+            sights.append((float(misfit[i, j]), sight))
+    return sorted(sights, key=lambda item: item[0])
 
 
 def _corners(patches: list[Blobs], without: int, slack: float) -> list[tuple[float, Sight]]:
@@ -122,14 +122,14 @@ def _corners(patches: list[Blobs], without: int, slack: float) -> list[tuple[flo
     # a quarter turn clockwise (in u + iv) leads from one mark to the next
     expected = middle + arm * 1j ** (single - first)
     misfit = np.abs(c[None, :] - expected) / (2 * np.abs(arm) + 1e-9)
-    found = []
+    corners = []
     for i, k in np.argwhere(misfit < slack):
         p, q = divmod(int(i), len(b))
         area = np.array([patches[first].area[p], patches[second].area[q], patches[single].area[k]])
         sight = _sight(complex(middle[i, 0]), complex(arm[i, 0]), first, area)
         if sight is not None:
-            found.append((float(misfit[i, k]), sight))
-    return sorted(found, key=lambda item: item[0])
+            corners.append((float(misfit[i, k]), sight))
+    return sorted(corners, key=lambda item: item[0])
 
 
 def _sight(centre: complex, arm: complex, mark: int, area: NDArray[np.float64]) -> Sight | None:
@@ -167,10 +167,12 @@ def _count(sights: list[Sight | None]) -> int:
 
 def agreeing(everything: list[list[tuple[float, Sight]]]) -> list[Sight | None]:
     """One sight a picture, of the size that most agree on: the camera stands still."""
-    reaches = np.array([s.reach for found in everything for _, s in found[:20]])
-    weight = np.array([1 / (0.01 + misfit) for found in everything for misfit, _ in found[:20]])
+    reaches = np.array([s.reach for sights in everything for _, s in sights[:20]])
+    weight = np.array([1 / (0.01 + misfit) for sights in everything for misfit, _ in sights[:20]])
     if not len(reaches):
         return [None] * len(everything)
-    near = np.abs(np.log(reaches[:, None] / reaches[None, :])) < 0.03
-    reach = float(reaches[np.argmax(near @ weight)])
-    return [next((s for _, s in found if abs(np.log(s.reach / reach)) < 0.04), None) for found in everything]
+    like = np.abs(np.log(reaches[:, None] / reaches[None, :])) < 0.03
+    reach = float(reaches[np.argmax(like @ weight)])
+    return [
+        next((s for _, s in sights if abs(np.log(s.reach / reach)) < 0.04), None) for sights in everything
+    ]

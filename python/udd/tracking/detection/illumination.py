@@ -56,8 +56,8 @@ def evenness(
     every, value = np.concatenate(terms), np.concatenate(values)
     fair = np.ones(len(value), dtype=bool)
     for _ in range(3):
-        found = np.linalg.lstsq(every[fair], value[fair], rcond=None)[0]
-        rest = np.abs(value - every @ found)
+        solution = np.linalg.lstsq(every[fair], value[fair], rcond=None)[0]
+        rest = np.abs(value - every @ solution)
         fair = rest <= SIGMAS * 1.48 * np.median(rest[fair])
     # a parabola says nothing about where the disk does not come
     centre, reach = np.array([s.centre for _, s in seen]), seen[0][1].reach
@@ -65,7 +65,7 @@ def evenness(
         np.clip(np.arange(size), x.min() - reach, x.max() + reach)
         for size, x in ((width, centre.real), (height, centre.imag))
     )
-    shade = np.stack([_terms(columns, np.full(width, row), view.shape) @ found for row in rows])
+    shade = np.stack([_terms(columns, np.full(width, row), view.shape) @ solution for row in rows])
     here = shade[np.ix_(rows == np.arange(height), columns == np.arange(width))]
     if np.ptp(here) < LEAST:
         return None

@@ -30,9 +30,9 @@ def sightings(
     chosen = [split(patches, bool(still)), *([patches] if still is None else [])]
     n = len(layout.places)
     best: list[Sight | None] = [None] * len(pictures)
-    for found in chosen:
+    for chosen_patches in chosen:
         for least in range(n, max(n - 2, min(n, 3) - 1), -1):
-            sights = agreeing([matches(p, layout, least, scale) for p in found])
+            sights = agreeing([matches(p, layout, least, scale) for p in chosen_patches])
             if sum(s is not None for s in sights) > 2 * sum(s is not None for s in best):
                 best = sights
             if sum(s is not None for s in best) >= max(3, len(pictures) // 10):
@@ -61,7 +61,7 @@ def matches(
 ) -> list[tuple[float, Sight]]:
     """Ways in which blobs could be the marks of the disk, as (misfit, sight), the best first."""
     body, n = layout.unit, len(layout.places)
-    found: list[tuple[int, float, Sight]] = []
+    sights: list[tuple[int, float, Sight]] = []
     for i in range(n):
         for j in range(i + 1, n):
             for a in patches[i].centre:
@@ -73,9 +73,9 @@ def matches(
                     if scale is None or abs(np.log(size / scale)) < SLACK:
                         match = _match(patches, body, complex(a - turn * body[i]), complex(turn))
                         if match is not None and match[0] >= least:
-                            found.append(match)
-    found.sort(key=lambda m: (-m[0], m[1]))
-    return [(misfit, sight) for _, misfit, sight in found[:MOST]]
+                            sights.append(match)
+    sights.sort(key=lambda m: (-m[0], m[1]))
+    return [(misfit, sight) for _, misfit, sight in sights[:MOST]]
 
 
 def _match(

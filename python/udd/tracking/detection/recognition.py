@@ -114,11 +114,11 @@ def _moving(
     film: Film, pictures: Sequence[Picture], sights: list[Sight | None], options: TrackOptions
 ) -> tuple[list[Sight | None], Sight | None]:
     """The sights, or those of another disk that moves, and what stands still and looks like it."""
-    found = [s for s in sights if s is not None]
-    if len(found) < FEWEST:
+    seen = [s for s in sights if s is not None]
+    if len(seen) < FEWEST:
         return sights, None
-    usual = max(found, key=lambda s: _like(found, s))
-    share = _like(found, usual) / len(found)
+    usual = max(seen, key=lambda s: _like(seen, s))
+    share = _like(seen, usual) / len(seen)
     if share < OFTEN:
         return sights, None
     fixed, moving = (_sights(pictures, options, still)[0] for still in (True, False))
@@ -148,11 +148,11 @@ def _without(still: Sight | None, options: TrackOptions, shape: tuple[int, ...])
     return np.asarray(clear > 0)
 
 
-def _like(sights: Sequence[Sight], one: Sight) -> int:
+def _like(sights: Sequence[Sight], usual: Sight) -> int:
     """How many sights are where this one is."""
     return sum(
-        abs(s.centre - one.centre) < SAME_PLACE
-        and abs(np.angle(np.exp(1j * (s.angle - one.angle)))) < SAME_ANGLE
+        abs(s.centre - usual.centre) < SAME_PLACE
+        and abs(np.angle(np.exp(1j * (s.angle - usual.angle)))) < SAME_ANGLE
         for s in sights
     )
 

@@ -76,7 +76,7 @@ def survey(film: Film) -> Survey:
 
 def slowest(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[tuple[Picture, Sight]]:
     """Pictures in which the disk was found, those with the least motion first, repeats last."""
-    found: list[tuple[float, Picture, Sight]] = []
+    rows: list[tuple[float, Picture, Sight]] = []
     at = iter(sights)
     for burst in bursts:
         here = [next(at) for _ in burst]
@@ -88,8 +88,8 @@ def slowest(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[tup
                 other = here[j] if 0 <= j < len(burst) else None
                 if other is not None:
                     moves.append(_apart(sight, other))
-            found.append((float(np.mean(moves)) if moves else np.inf, picture, sight))
-    ordered = sorted(found, key=lambda item: item[0])
+            rows.append((float(np.mean(moves)) if moves else np.inf, picture, sight))
+    ordered = sorted(rows, key=lambda item: item[0])
     return [(p, s) for _, p, s in repeats_last(ordered, [s for *_, s in ordered])]
 
 
@@ -99,8 +99,8 @@ def repeats_last(items: list[Any], sights: list[Sight]) -> list[Any]:
     again: list[int] = []
     for k, sight in enumerate(sights):
         # a disk at rest teaches nothing new
-        known = any(_apart(sight, sights[j]) < NEW * sight.reach for j in first)
-        (again if known else first).append(k)
+        repeated = any(_apart(sight, sights[j]) < NEW * sight.reach for j in first)
+        (again if repeated else first).append(k)
     return [items[k] for k in first + again]
 
 
@@ -123,7 +123,7 @@ class Moving:
 
 def moving(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[Moving]:
     """Pictures in which the disk was found, as it was in one next to it or more."""
-    found = []
+    rows = []
     at = iter(sights)
     for burst in bursts:
         here = [(p, s) for p, s in zip(burst, [next(at) for _ in burst], strict=True) if s is not None]
@@ -138,5 +138,5 @@ def moving(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[Movi
                 rate, turn = sum(r[1] - r[0] for r in rates) / time, sum(r[2] for r in rates)
                 rate /= np.sinc(turn / (2 * np.pi))  # a turning disk goes along an arc, longer than its chord
                 turning = turn / time
-                found.append(Moving(picture, sight, rate, turning, time / len(rates), rates[-1]))
-    return found
+                rows.append(Moving(picture, sight, rate, turning, time / len(rates), rates[-1]))
+    return rows

@@ -70,14 +70,14 @@ def click(
     ['layout', 'pivot', 'scale', 'sigma']
     """
     said = dict(as_said({} if config is None else config)[1])
-    known = settings({} if config is None else config)
+    options = settings({} if config is None else config)
     if distance is not None:
         try:
             distance = positive(distance)
         except (TypeError, ValueError):
             raise TrackError(f"distance must be a positive number of metres, not {distance!r}") from None
-    check(known, distance)
-    film = Film(video, fps=known.get("fps"))
+    check(options, distance)
+    film = Film(video, fps=options.get("fps"))
     figure = _figure()
     try:
         frames = still_frames(survey(film))

@@ -70,8 +70,8 @@ def patch(picture: Picture, at: complex, full_range: bool, miss: float = CLICK) 
     height, width = u.shape
     if not (0 <= row < height and 0 <= column < width):
         return None
-    near = slice(max(0, row - 1), row + 2), slice(max(0, column - 1), column + 2)
-    tint = np.array([np.median(u[near]), np.median(v[near])])
+    about = slice(max(0, row - 1), row + 2), slice(max(0, column - 1), column + 2)
+    tint = np.array([np.median(u[about]), np.median(v[about])])
     strength = float(np.hypot(*tint))
     if strength < PALEST:
         return None

@@ -147,8 +147,8 @@ class ClickSession:
         elif self.question == "rim":
             self._put(replace(a, rim=(*a.rim, at)))
         elif self.question == "ruler":
-            near = [m.centre for m in a.marks if abs(m.centre - at) < SNAP * self.miss]
-            self._pair("ruler", near[0] if near else at, SHORTEST, "too near to each other to tell a scale")
+            close = [m.centre for m in a.marks if abs(m.centre - at) < SNAP * self.miss]
+            self._pair("ruler", close[0] if close else at, SHORTEST, "too near to each other to tell a scale")
         elif self.question == "region":
             self._pair("region", at, NARROWEST, "too near to each other for a region")
 
@@ -225,16 +225,16 @@ class ClickSession:
         if any(m.holds(at) for m in a.marks):
             self.remark = "That mark is clicked already."
             return
-        found = patch(self.picture, at, self.full_range, self.miss)
-        if found is None:
+        clicked = patch(self.picture, at, self.full_range, self.miss)
+        if clicked is None:
             self.remark = "There is no colour there: click the middle of a coloured mark."
             return
-        if found.refined and any(abs(m.centre - found.centre) < SNAP * self.miss for m in a.marks):
+        if clicked.refined and any(abs(m.centre - clicked.centre) < SNAP * self.miss for m in a.marks):
             self.remark = "That mark is clicked already."
             return
-        if not found.refined:
+        if not clicked.refined:
             self.remark = "Its edges are not all clear (is it hidden in part?): it is taken as clicked."
-        self._put(replace(a, marks=(*a.marks, found)))
+        self._put(replace(a, marks=(*a.marks, clicked)))
 
     def _pair(self, name: str, at: complex, least: float, why: str) -> None:
         """One of the two points of a ruler or a region."""

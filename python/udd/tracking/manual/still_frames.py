@@ -20,7 +20,7 @@ def still_frames(look_over: Survey) -> list[Picture]:
     is not calm. Hidden marks, or marks that blur makes pale, reduce the coloured samples; a coloured
     background is the same in all frames. Where all frames are unusable, all of them.
     """
-    found: list[tuple[float, int, Picture]] = []
+    calm: list[tuple[float, int, Picture]] = []
     for burst in look_over.bursts:
         here = []
         for k, picture in enumerate(burst):
@@ -33,12 +33,12 @@ def still_frames(look_over: Survey) -> list[Picture]:
         if len(here) > 2:
             here = here[1:-1]  # those with a neighbour on each side
         if here:
-            found.append(min(here, key=lambda item: item[0]))
-    if not found:
+            calm.append(min(here, key=lambda item: item[0]))
+    if not calm:
         return look_over.pictures[:MOST]
-    most, least = max(n for _, n, _ in found), min(n for _, n, _ in found)
-    seen = [item for item in found if item[1] >= most - OPEN * (most - least)]
+    most, least = max(n for _, n, _ in calm), min(n for _, n, _ in calm)
+    seen = [item for item in calm if item[1] >= most - OPEN * (most - least)]
     seen.sort(key=lambda item: item[0])
     shown = {picture.index for _, _, picture in seen}
-    rest = sorted((item for item in found if item[2].index not in shown), key=lambda item: -item[1])
+    rest = sorted((item for item in calm if item[2].index not in shown), key=lambda item: -item[1])
     return [picture for _, _, picture in (seen + rest)[:MOST]]

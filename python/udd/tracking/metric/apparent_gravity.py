@@ -92,12 +92,12 @@ def apparent_gravity(t: Array, values: Array, radius: float) -> ApparentGravity 
     size = np.maximum(np.abs(design).max(axis=0), 1e-12)
     design = design / size
     for _ in range(ROUNDS):
-        found = np.linalg.lstsq(design * weight[:, None], right * weight, rcond=1e-9)[0]
-        rest = np.abs(right - design @ found)
+        solution = np.linalg.lstsq(design * weight[:, None], right * weight, rcond=1e-9)[0]
+        rest = np.abs(right - design @ solution)
         weight = np.sqrt(1 / np.maximum(1.0, rest / (2 * np.median(rest) + 1e-15)))
     spread = float(np.sqrt(np.sum((rest * weight) ** 2) / max(len(right) / 2 - 5, 1)))  # stretches overlap
     inverse = np.linalg.pinv((design * weight[:, None]).T @ (design * weight[:, None]), rcond=1e-12)
-    torque, sigma = found[:2] / size[:2], spread * np.sqrt(np.diag(inverse)[:2]) / size[:2]
+    torque, sigma = solution[:2] / size[:2], spread * np.sqrt(np.diag(inverse)[:2]) / size[:2]
     value = complex(torque[1], -torque[0])
     return ApparentGravity(value, float(np.hypot(*sigma)))
 

@@ -29,7 +29,7 @@ MINOR = 0.1  # share of what is said below which the film alone is named
 APART = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
 
 
-def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOptions) -> Camera:
+def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOptions) -> Camera:
     """Scale and contact point, from the rolling constraint, by hand, or at worst from the support.
 
     A contact that is said with an error counts by it beside the rolling constraint's own.
@@ -41,45 +41,47 @@ def camera_of(tracks: Tracks, known: TrackerState, size: Scale, options: TrackOp
     """
     angle, centre = tracks.angle, tracks.centre
     good = np.isfinite(angle)
-    found = rolling(tracks.t, centre, angle, good, known.look.reach)
+    contact = rolling(tracks.t, centre, angle, good, state.look.reach)
     drive, drive_sigma = complex(np.nan, np.nan), np.nan
-    if found is not None:
-        drive = complex(np.conj(found.drive) / size.value)
-        drive_sigma = float(np.hypot(found.drive_sigma / size.value, abs(drive) * size.sigma / size.value))
+    if contact is not None:
+        drive = complex(np.conj(contact.drive) / size.value)
+        drive_sigma = float(np.hypot(contact.drive_sigma / size.value, abs(drive) * size.sigma / size.value))
 
     def camera(place: complex, sigma: float, origin: str) -> Camera:
         return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive, drive_sigma)
 
     if options.pivot is not None:
-        place, said = complex(known.look.lens.plane(complex(*options.pivot))), options.sigma.pivot
-        if found is None or not said or not options.calibrate.pivot:
+        place, said = complex(state.look.lens.plane(complex(*options.pivot))), options.sigma.pivot
+        if contact is None or not said or not options.calibrate.pivot:
             return camera(place, said / size.value, "given")
-        of_film = float(found.covariance[0, 0])
-        if abs(found.place - place) < APART * np.hypot(said, np.sqrt(of_film)):
+        of_film = float(contact.covariance[0, 0])
+        if abs(contact.place - place) < APART * np.hypot(said, np.sqrt(of_film)):
             share = of_film / (of_film + said**2)  # of what is said
             sigma = float(np.sqrt(share) * said) / size.value
             how = "rolling constraint" if share < MINOR else "rolling constraint and given"
-            return camera(found.place + share * (place - found.place), sigma, how)
+            return camera(contact.place + share * (place - contact.place), sigma, how)
         warnings.warn(
-            f"the disk turns about a point {abs(found.place - place):.0f} pixels from the pivot that is "
+            f"the disk turns about a point {abs(contact.place - place):.0f} pixels from the pivot that is "
             "given; the motion is believed",
             stacklevel=outside(),
         )
-    if found is not None:
-        return camera(found.place, float(np.sqrt(found.covariance[0, 0])) / size.value, "rolling constraint")
-    guess = support(known.view)
+    if contact is not None:
+        return camera(
+            contact.place, float(np.sqrt(contact.covariance[0, 0])) / size.value, "rolling constraint"
+        )
+    guess = support(state.view)
     if guess is None:
         raise TrackError(
             "the motion does not determine the contact point (the disk hardly turns, or turns steadily) "
             "and no support is seen: give pivot=(u, v) in pixels"
         )
-    return camera(complex(known.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
+    return camera(complex(state.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
 
 
 def meta_of(
     film: Film,
     tracks: Tracks,
-    known: TrackerState,
+    state: TrackerState,
     camera: Camera,
     options: TrackOptions,
     doubtful: int,
@@ -93,8 +95,8 @@ def meta_of(
             "the film may be cut off",
             stacklevel=outside(),
         )
-    look = known.look
-    middle = (middle_of(known.view.shape) - camera.pivot) / camera.scale
+    look = state.look
+    middle = (middle_of(state.view.shape) - camera.pivot) / camera.scale
     return {
         "source": film.path.name,
         "R": options.disk_radius,
@@ -104,9 +106,9 @@ def meta_of(
         "frames_missing": missing,
         "frames_lost": sum(flag != "" for flag in tracks.flag),
         "turns_doubtful": doubtful,
-        "exposure": known.exposure,
-        "readout": known.estimates["readout"].value,
-        "readout_sigma": known.estimates["readout"].sigma,
+        "exposure": state.exposure,
+        "readout": state.estimates["readout"].value,
+        "readout_sigma": state.estimates["readout"].sigma,
         "px_per_m": camera.scale,
         "px_per_m_sigma": camera.scale_sigma,
         "px_per_m_from": camera.scale_from,
@@ -124,7 +126,7 @@ def meta_of(
         "wobble": turned.amplitude if math.isfinite(turned.least) else None,
         "wobble_sigma": turned.sigma if math.isfinite(turned.least) else None,
         "wobble_axis": turned.axis,
-        "calibration": table(estimates(tracks, known, camera, options, turned)),
+        "calibration": table(estimates(tracks, state, camera, options, turned)),
     }
 
 
@@ -133,21 +135,21 @@ def _numbers(lens: Lens) -> list[float]:
 
 
 def estimates(
-    tracks: Tracks, known: TrackerState, camera: Camera, options: TrackOptions, turned: Wobble
+    tracks: Tracks, state: TrackerState, camera: Camera, options: TrackOptions, turned: Wobble
 ) -> dict[str, Estimate]:
     """Return the value, the standard error and the origin of every item.
 
     Lengths in m, times in s, the contact in pixels of the picture, the rest bare numbers; `how` is "found",
     "none found" (0 is as good), "given" (also where it was switched off), or says from what.
     """
-    out = dict(known.estimates)
+    out = dict(state.estimates)
     fixed = not options.calibrate.layout
-    for k, (place, sigma) in enumerate(zip(known.look.places, places_sigma(tracks), strict=True), 1):
+    for k, (place, sigma) in enumerate(zip(state.look.places, places_sigma(tracks), strict=True), 1):
         at = place / camera.scale
         error = 0.0 if fixed else float(sigma / camera.scale)
         out[f"mark {k}"] = Estimate([float(at.real), float(-at.imag)], error, "given" if fixed else "found")
     out["scale"] = Estimate(camera.scale, camera.scale_sigma, camera.scale_from)
-    at = complex(known.look.lens.picture(camera.pivot))
+    at = complex(state.look.lens.picture(camera.pivot))
     out["pivot"] = Estimate([at.real, at.imag], camera.pivot_sigma * camera.scale, camera.pivot_from)
     out["W"] = Estimate(camera.drive.imag, camera.drive_sigma, "rolling constraint")
     out["wobble"] = turned.estimate

@@ -38,8 +38,8 @@ def common_mode_errors(tracks: Tracks, covariance: Array, camera: Camera) -> Arr
         return out
     seen, expected = _jumps(tracks, covariance, camera)
     streak = tracks.streak
-    known = np.flatnonzero(np.isfinite(seen))
-    order = known[np.argsort(streak[known], kind="stable")]
+    rows = np.flatnonzero(np.isfinite(seen))
+    order = rows[np.argsort(streak[rows], kind="stable")]
     if len(order) < GROUP:
         return out
     groups = np.array_split(order, len(order) // GROUP if np.isfinite(streak[order]).all() else 1)
@@ -55,15 +55,15 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     drive = complex(np.conj(camera.drive)) * camera.scale
     good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
     maps = moved_by_pose(-away)  # of a pose's error to that of c - p where the angle is taken out
-    own = np.einsum("nij,njk,nik->n", maps, covariance, maps)
+    variance = np.einsum("nij,njk,nik->n", maps, covariance, maps)
     usual = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     second, weights = np.full(len(t), np.nan + 0j), np.zeros((len(t), 3), dtype=complex)
     for k in range(1, len(t) - 1):
         three = slice(k - 1, k + 2)
         if not good[three].all() or t[k + 1] - t[k - 1] > CLOSE * usual:
             continue
-        near = np.flatnonzero(good[max(0, k - 2) : k + 3]) + max(0, k - 2)
-        swept = CubicSpline(t[near], np.exp(-1j * (angle[near] - angle[k]))).antiderivative()(t[three])
+        about = np.flatnonzero(good[max(0, k - 2) : k + 3]) + max(0, k - 2)
+        swept = CubicSpline(t[about], np.exp(-1j * (angle[about] - angle[k]))).antiderivative()(t[three])
         weights[k] = SECOND * np.exp(-1j * (angle[three] - angle[k]))
         second[k] = weights[k] @ away[three] - drive * (SECOND @ swept)
     seen, expected = np.full(len(t), np.nan), np.full(len(t), np.nan)
@@ -75,7 +75,7 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
         difference = SECOND @ second[k - 1 : k + 2]
         if np.isfinite(difference):
             seen[k] = abs(difference) ** 2 / size.sum()
-            expected[k] = size @ own[k - 2 : k + 3] / size.sum()
+            expected[k] = size @ variance[k - 2 : k + 3] / size.sum()
     return seen, expected
 
 

@@ -59,8 +59,8 @@ def _usual(
     """
     out, belief = np.ones(len(total)), np.full(len(total), ALIKE)
     which = np.full(len(total), -1)
-    known = np.flatnonzero(spare > 0)
-    order = known[np.argsort(streak[known], kind="stable")]
+    rows = np.flatnonzero(spare > 0)
+    order = rows[np.argsort(streak[rows], kind="stable")]
     showing = order[new[order]]
     if not len(showing):
         return out, belief, which

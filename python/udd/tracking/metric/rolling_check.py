@@ -33,15 +33,15 @@ def health(m: Measurement) -> Health | None:
     """
     good, radius = m.seen, float(m.meta["R"])
     centre = m["Y"] - 1j * m["Z"]
-    found = pivot(m.t, centre, m["beta"], good, REACH * radius)
-    if found is None:
+    contact = pivot(m.t, centre, m["beta"], good, REACH * radius)
+    if contact is None:
         return None
     rest = np.full(len(m), complex(np.nan, np.nan))
     for a, b in windows(m.t, good):
         turn = np.exp(-1j * m["beta"][a:b])
         dt = m.t[a:b] - m.t[a]
         swept = CubicSpline(dt, turn).antiderivative()(dt)
-        off = centre[a:b] * turn - found.place * turn - found.drive * swept
+        off = centre[a:b] * turn - contact.place * turn - contact.drive * swept
         rest[a:b] = (off - off.mean()) / turn
     judged = np.isfinite(rest)
     if not judged.any():

@@ -101,14 +101,14 @@ def _ratio(frames: list[tuple[Array, Array]]) -> Array:
         return np.ones(2)
     squares = np.concatenate([(off**2).reshape(-1, 2) for _, off in frames])
     most = OUTLIER * np.median(squares, axis=0)
-    found = np.minimum(squares, most).sum(axis=0)
+    misfits = np.minimum(squares, most).sum(axis=0)
     made = np.zeros((2, 2))
     for design, _ in frames:
         marks = len(design) // 2
         made += (_left(design) ** 2).reshape(marks, 2, marks, 2).sum(axis=(0, 2))
     if np.linalg.cond(made) > 1e3:  # too few marks to tell
         return np.ones(2)
-    each = np.linalg.solve(made, found)
+    each = np.linalg.solve(made, misfits)
     each = np.maximum(each, LEAST * each.max())
     return np.asarray(each / each.mean())
 

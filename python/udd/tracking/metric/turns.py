@@ -149,5 +149,5 @@ def _usual_acceleration(t: Array, angle: Array) -> float:
 def _fastest(t: Array, angle: Array) -> float:
     """Nearly the fastest rate at which the disk is seen to turn."""
     rate = np.abs(np.diff(angle) / np.diff(t))
-    near = np.isfinite(rate) & (np.diff(t) < SHORT * float(np.median(np.diff(t))))
-    return float(np.quantile(rate[near], 0.99)) if near.any() else 20.0
+    close = np.isfinite(rate) & (np.diff(t) < SHORT * float(np.median(np.diff(t))))
+    return float(np.quantile(rate[close], 0.99)) if close.any() else 20.0

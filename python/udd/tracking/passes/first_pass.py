@@ -56,7 +56,7 @@ class PoseSample:
 
 def follow(
     pictures: Iterable[Picture],
-    known: TrackerState,
+    state: TrackerState,
     tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
 ) -> Tracks:
     """Track the disk through `pictures`; one row per picture, flagged where the disk is not tracked.
@@ -67,12 +67,12 @@ def follow(
     past: list[PoseSample] = []
     last: NDArray[np.uint8] | None = None
     for picture in pictures:
-        flag, fit, pose, motion = _track_frame(picture, known, past, last)
+        flag, fit, pose, motion = _track_frame(picture, state, past, last)
         # a disk that is not seen, as behind a hand, does not move: no copy is recognised by it
         last = picture.y if flag in ("", REPEATED) else None
-        streak = known.look.streak(motion)
+        streak = state.look.streak(motion)
         if fit is None:
-            frames.append(lost_in(picture.t, flag, streak, len(known.look.marks)))
+            frames.append(lost_in(picture.t, flag, streak, len(state.look.marks)))
         else:
             frames.append(found_in(picture.t, fit, pose, streak, "fast"))
             past = [*past[-2:], PoseSample(picture.t, pose, motion.spin)]
@@ -81,26 +81,26 @@ def follow(
 
 
 def _track_frame(
-    picture: Picture, known: TrackerState, past: list[PoseSample], last: NDArray[np.uint8] | None
+    picture: Picture, state: TrackerState, past: list[PoseSample], last: NDArray[np.uint8] | None
 ) -> tuple[str, Fit | None, Pose, Motion]:
     nowhere = Pose(complex(np.nan, np.nan), np.nan)
     flag = unusable(picture)
     if flag:
         return flag, None, nowhere, Motion()
-    guess = predict(past, picture.t, known.contact)
-    if last is not None and guess is not None and repeats(picture.y, last, guess, past[-1].pose, known.look):
+    guess = predict(past, picture.t, state.contact)
+    if last is not None and guess is not None and repeats(picture.y, last, guess, past[-1].pose, state.look):
         return REPEATED, None, nowhere, Motion()
     if guess is not None and picture.t - past[-1].t < FRESH:
         pose = Pose(guess.centre, guess.angle)
-        motion = _motion(past, guess, picture.t, known)
-        fit = fit_and_check(picture, known, pose, motion, CLOSE)
+        motion = _motion(past, guess, picture.t, state)
+        fit = fit_and_check(picture, state, pose, motion, CLOSE)
         if fit is not None:
-            better = _motion(past, pose, picture.t, known)
-            if abs(known.look.streak(better) - known.look.streak(motion)) > 0.3:
+            better = _motion(past, pose, picture.t, state)
+            if abs(state.look.streak(better) - state.look.streak(motion)) > 0.3:
                 motion = better
-                fit = fit_and_check(picture, known, pose, motion, [MISFIT, MISFIT]) or fit
+                fit = fit_and_check(picture, state, pose, motion, [MISFIT, MISFIT]) or fit
             return "", fit, pose, motion
-    best = _reacquire(picture, known, guess, past)
+    best = _reacquire(picture, state, guess, past)
     if best is None:
         return lost("fewer than two marks agree"), None, nowhere, Motion()
     fit, pose, motion = best
@@ -108,18 +108,18 @@ def _track_frame(
 
 
 def fit_and_check(
-    picture: Picture, known: TrackerState, pose: Pose, motion: Motion, rounds: list[float]
+    picture: Picture, state: TrackerState, pose: Pose, motion: Motion, rounds: list[float]
 ) -> Fit | None:
     """Align and check; a mark that disagrees with three others is left out."""
-    most_off = MOST_OFF + STREAK_OFF * known.look.streak(motion)
+    most_off = MOST_OFF + STREAK_OFF * state.look.streak(motion)
     start = Pose(pose.centre, pose.angle)
-    fit = align(picture.y, known.view, known.look, pose, motion, rounds)
+    fit = align(picture.y, state.view, state.look, pose, motion, rounds)
     if fit is not None and fit.used.sum() >= 4 and _worst(fit)[1] > most_off:
         pose.centre, pose.angle = start.centre, start.angle
-        fit = align(picture.y, known.view, known.look, pose, motion, rounds, without=_worst(fit)[0])
+        fit = align(picture.y, state.view, state.look, pose, motion, rounds, without=_worst(fit)[0])
     if fit is None or fit.moved > 0.5 + 0.1 * most_off or _worst(fit)[1] > most_off:
         return None
-    return fit if _on_the_disk(picture, known, pose) else None
+    return fit if _on_the_disk(picture, state, pose) else None
 
 
 def _worst(fit: Fit) -> tuple[int, float]:
@@ -128,9 +128,9 @@ def _worst(fit: Fit) -> tuple[int, float]:
     return k, float(off[k])
 
 
-def _on_the_disk(picture: Picture, known: TrackerState, pose: Pose) -> bool:
+def _on_the_disk(picture: Picture, state: TrackerState, pose: Pose) -> bool:
     """Whether the disk is where the marks say: bare and bright inside the square of the marks."""
-    look = known.look
+    look = state.look
     half = np.hypot(*look.marks[0].half)
     inner = 0.7 * (look.reach - half) * BARE
     marks = look.places * np.exp(1j * pose.angle)
@@ -140,23 +140,23 @@ def _on_the_disk(picture: Picture, known: TrackerState, pose: Pose) -> bool:
     height, width = picture.y.shape
     ok = (r >= 0) & (r < height) & (c >= 0) & (c < width)
     r, c = r[ok], c[ok]
-    clear = known.view[r, c]
+    clear = state.view[r, c]
     if clear.sum() < 5:
         return True
     level = picture.y[r[clear], c[clear]].astype(float)
-    return bool(np.mean(np.abs(level - known.white) < 0.2 * known.white) > 0.7)
+    return bool(np.mean(np.abs(level - state.white) < 0.2 * state.white) > 0.7)
 
 
 def _reacquire(
-    picture: Picture, known: TrackerState, guess: Pose | None, past: list[PoseSample]
+    picture: Picture, state: TrackerState, guess: Pose | None, past: list[PoseSample]
 ) -> tuple[Fit, Pose, Motion] | None:
     """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
     shape = picture.y.shape
-    reach = known.look.reach
+    reach = state.look.reach
     box = (0, shape[0], 0, shape[1])
     fresh = guess is not None and picture.t - past[-1].t < FRESH
     if guess is not None and fresh:
-        r, at = 2.0 * reach, complex(known.look.lens.picture(guess.centre))
+        r, at = 2.0 * reach, complex(state.look.lens.picture(guess.centre))
         box = (
             max(0, int(at.imag - r)),
             min(shape[0], int(at.imag + r)),
@@ -165,14 +165,14 @@ def _reacquire(
         )
         if box[1] - box[0] < reach or box[3] - box[2] < reach:
             return None
-    patches = classify(picture, known.colours, known.view, box)
+    patches = classify(picture, state.colours, state.view, box)
     best: tuple[float, Fit, Pose, Motion] | None = None
-    for start in candidates(patches, known.look, guess if fresh else None)[:MOST_TRIED]:
+    for start in candidates(patches, state.look, guess if fresh else None)[:MOST_TRIED]:
         if guess is not None:
             start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
-        for motion in _motions(past, start, picture.t, known, fresh):
+        for motion in _motions(past, start, picture.t, state, fresh):
             pose = Pose(start.centre, start.angle)
-            fit = fit_and_check(picture, known, pose, motion, FAR)
+            fit = fit_and_check(picture, state, pose, motion, FAR)
             if fit is not None:
                 score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
                 if best is None or score > best[0]:
@@ -182,17 +182,17 @@ def _reacquire(
     return None if best is None else best[1:]
 
 
-def _motions(past: list[PoseSample], pose: Pose, t: float, known: TrackerState, fresh: bool) -> list[Motion]:
+def _motions(past: list[PoseSample], pose: Pose, t: float, state: TrackerState, fresh: bool) -> list[Motion]:
     if fresh:
-        return [_motion(past, pose, t, known)]
-    if known.exposure <= 0:
+        return [_motion(past, pose, t, state)]
+    if state.exposure <= 0:
         return [Motion()]
-    step = 2 * STREAK_STEP / (known.look.reach * known.exposure)
+    step = 2 * STREAK_STEP / (state.look.reach * state.exposure)
     count = int(np.ceil(FASTEST / step))
     rates = step * np.arange(-count, count + 1)
-    if known.contact is not None:
-        return [along_contact(known, pose, r) for r in rates]
-    return [Motion(0j, r * known.exposure, spin=r) for r in rates]
+    if state.contact is not None:
+        return [along_contact(state, pose, r) for r in rates]
+    return [Motion(0j, r * state.exposure, spin=r) for r in rates]
 
 
 def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose | None:
@@ -215,7 +215,7 @@ def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose |
     return Pose(complex(weights @ np.array([h.pose.centre for h in recent])), angle)
 
 
-def _motion(past: list[PoseSample], pose: Pose, t: float, known: TrackerState) -> Motion:
+def _motion(past: list[PoseSample], pose: Pose, t: float, state: TrackerState) -> Motion:
     """Movement during the exposure, from the derivative at `t` of the curve through the last poses."""
     points = [h for h in past[-2:] if t - h.t < 0.5]
     if not points:
@@ -231,18 +231,18 @@ def _motion(past: list[PoseSample], pose: Pose, t: float, known: TrackerState) -
         shift, turn = shift + (shift - s0) * lean, turn + (turn - a0) * lean
     else:
         turn = 2 * turn - points[-1].rate  # the mean rate over the step, and the rate at its beginning
-    if known.contact is None:
-        return Motion(shift * known.exposure, turn * known.exposure, rate=shift, spin=turn)
-    return along_contact(known, pose, turn, change)
+    if state.contact is None:
+        return Motion(shift * state.exposure, turn * state.exposure, rate=shift, spin=turn)
+    return along_contact(state, pose, turn, change)
 
 
-def along_contact(known: TrackerState, pose: Pose, spin: float, change: float = 0.0) -> Motion:
+def along_contact(state: TrackerState, pose: Pose, spin: float, change: float = 0.0) -> Motion:
     """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
-    contact = known.contact
+    contact = state.contact
     assert contact is not None
     rate = contact.velocity(pose.centre, spin)
     bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
-    return Motion.of_rates(rate, spin, bending, change, known.exposure)
+    return Motion.of_rates(rate, spin, bending, change, state.exposure)
 
 
 def repeats(

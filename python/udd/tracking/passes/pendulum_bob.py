@@ -247,7 +247,7 @@ def _pendulum(
     # a mistake along the path is as large as one across it, which the circle shows
     spread = max(1.48 * float(np.median(np.abs(rest[seen] - np.median(rest[seen])))), 0.01)
     t, flag = inserted_copies(t, at, flag, spread)
-    at[[one.startswith(REPEATED) for one in flag]] = complex(np.nan, np.nan)
+    at[[text.startswith(REPEATED) for text in flag]] = complex(np.nan, np.nan)
     seen = np.isfinite(at)
     away = at - pivot
     theta = np.full(len(t), np.nan)

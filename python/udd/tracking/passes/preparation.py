@@ -151,20 +151,20 @@ def lens_estimates(bent: Bent, lens: Lens, wanted: Calibrate) -> dict[str, Estim
     }
 
 
-def readout_estimate(found: Readout, wanted: Calibrate) -> dict[str, Estimate]:
+def readout_estimate(readout: Readout, wanted: Calibrate) -> dict[str, Estimate]:
     """The readout as a row of the table."""
-    how = "found" if found.value else "none found"
-    return {"readout": wanted.estimate("readout", found.value, found.sigma, how)}
+    how = "found" if readout.value else "none found"
+    return {"readout": wanted.estimate("readout", readout.value, readout.sigma, how)}
 
 
-def exposure_estimate(found: Exposure, wanted: Calibrate) -> dict[str, Estimate]:
+def exposure_estimate(exposure: Exposure, wanted: Calibrate) -> dict[str, Estimate]:
     """The exposure as a row of the table."""
-    how = "found" if found.value or np.isfinite(found.sigma) else "too slow to tell"
-    return {"exposure": wanted.estimate("exposure", found.value, found.sigma, how)}
+    how = "found" if exposure.value or np.isfinite(exposure.sigma) else "too slow to tell"
+    return {"exposure": wanted.estimate("exposure", exposure.value, exposure.sigma, how)}
 
 
 def recalibrate(
-    known: TrackerState, look_over: Survey, tracks: Tracks, options: TrackOptions
+    state: TrackerState, look_over: Survey, tracks: Tracks, options: TrackOptions
 ) -> TrackerState:
     """Exposure, readout and marks once more, now that every frame's motion is known from its neighbours."""
     around, wanted = LocalMotion(tracks), options.calibrate
@@ -174,27 +174,27 @@ def recalibrate(
         if here is not None and here.tracked and not tracks.flag[picture.index]:
             frames.append((picture.y, here))
     if not frames:
-        return known
-    if known.look.readout and wanted.given("readout") is None:
-        moving = [(y, here.pose, here.motion(known.exposure)) for y, here in frames]
-        rolling = readout(moving, known.look, known.view, around.interval)
+        return state
+    if state.look.readout and wanted.given("readout") is None:
+        moving = [(y, here.pose, here.motion(state.exposure)) for y, here in frames]
+        rolling = readout(moving, state.look, state.view, around.interval)
         if rolling.value:
-            estimates = {**known.estimates, **readout_estimate(rolling, wanted)}
-            known = replace(known, look=replace(known.look, readout=rolling.value), estimates=estimates)
-    if known.exposure and wanted.given("exposure") is None:
+            estimates = {**state.estimates, **readout_estimate(rolling, wanted)}
+            state = replace(state, look=replace(state.look, readout=rolling.value), estimates=estimates)
+    if state.exposure and wanted.given("exposure") is None:
         paths = [(y, here.pose, here.motion) for y, here in frames]
-        value = retimed(paths, known.exposure, known.look, known.view)
-        found = Exposure(value, known.estimates["exposure"].sigma)
-        known = replace(
-            known, exposure=value, estimates={**known.estimates, **exposure_estimate(found, wanted)}
+        value = retimed(paths, state.exposure, state.look, state.view)
+        exposure = Exposure(value, state.estimates["exposure"].sigma)
+        state = replace(
+            state, exposure=value, estimates={**state.estimates, **exposure_estimate(exposure, wanted)}
         )
-    moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(known.exposure)) for y, here in frames]
-    moving.sort(key=lambda f: known.look.streak(f[2]))
-    moving = _with_new_poses(moving, known.look)
+    moving = [(y, Pose(here.pose.centre, here.pose.angle), here.motion(state.exposure)) for y, here in frames]
+    moving.sort(key=lambda f: state.look.streak(f[2]))
+    moving = _with_new_poses(moving, state.look)
     slower = moving[: -(-len(moving) // 2)]
     fixed = None if wanted.layout else options.layout.unit
-    look = refine(known.look, slower[:: -(-len(slower) // MOST)], known.view, AGAIN, fixed)
-    return replace(known, look=look)
+    look = refine(state.look, slower[:: -(-len(slower) // MOST)], state.view, AGAIN, fixed)
+    return replace(state, look=look)
 
 
 def _with_new_poses(
@@ -239,8 +239,8 @@ def rim_span(options: TrackOptions) -> tuple[float, float]:
     if options.layout.standard:
         return SPAN
     ratio = options.disk_radius / options.layout.reach
-    near = NEAR_RIM + min(SURE * options.sigma.layout / options.disk_radius, NEAR_RIM)
-    return (1 - near) * ratio, (1 + near) * ratio
+    margin = NEAR_RIM + min(SURE * options.sigma.layout / options.disk_radius, NEAR_RIM)
+    return (1 - margin) * ratio, (1 + margin) * ratio
 
 
 def _contact(in_motion: list[Moving], look: DiskAppearance) -> Contact | None:

@@ -50,7 +50,7 @@ class Local:
 
 def refine(
     pictures: Iterable[Picture],
-    known: TrackerState,
+    state: TrackerState,
     first: Tracks,
     tick: Callable[[int], object] = lambda _: None,
     streaks_only: bool = False,
@@ -66,7 +66,7 @@ def refine(
     around = LocalMotion(first)
     for k, picture in enumerate(pictures):
         if k < len(first) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
-            seen = known if look_at is None else replace(known, look=look_at(k))
+            seen = state if look_at is None else replace(state, look=look_at(k))
             frame = _refine_frame(picture, k, seen, around, first)
             if frame is not None:
                 better[k] = frame
@@ -75,18 +75,18 @@ def refine(
 
 
 def _refine_frame(
-    picture: Picture, k: int, known: TrackerState, around: LocalMotion, tracks: Tracks
+    picture: Picture, k: int, state: TrackerState, around: LocalMotion, tracks: Tracks
 ) -> FrameTrack | None:
     if tracks.flag[k] and not is_lost(tracks.flag[k]):
         return None
     here = around.at(k)
     if here is None:
         return None
-    motion = here.motion(known.exposure)
+    motion = here.motion(state.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
-    fit = fit_and_check(picture, known, pose, motion, KNOWN if here.tracked else FORESEEN)
-    reach = known.look.reach
-    streak = known.look.streak(motion)
+    fit = fit_and_check(picture, state, pose, motion, KNOWN if here.tracked else FORESEEN)
+    reach = state.look.reach
+    streak = state.look.streak(motion)
     if fit is None:
         return None
     away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
@@ -145,10 +145,10 @@ def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array
     around, out = LocalMotion(tracks), covariance.copy()
     good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
     for k in np.flatnonzero(good):
-        near, weights = around.bending(int(k))
-        if good[near].all():
-            share = (near == k) - 0.5 * variance * weights
-            out[k] = np.einsum("j,jab->ab", share**2, covariance[near])
+        rows, weights = around.bending(int(k))
+        if good[rows].all():
+            share = (rows == k) - 0.5 * variance * weights
+            out[k] = np.einsum("j,jab->ab", share**2, covariance[rows])
     return out
 
 
@@ -166,35 +166,35 @@ class LocalMotion:
         place = int(np.searchsorted(self.good, k))
         tracked = place < len(self.good) and bool(self.good[place] == k)
         low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + tracked
-        near = self.good[low:high]
-        x = (self.t[near] - self.t[k]) / self.interval
-        return near[np.abs(x) < NEAR], x[np.abs(x) < NEAR], tracked
+        rows = self.good[low:high]
+        x = (self.t[rows] - self.t[k]) / self.interval
+        return rows[np.abs(x) < NEAR], x[np.abs(x) < NEAR], tracked
 
     def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
         """Return how centre and angle differ from the neighbours' prediction; 0 if these are too few."""
-        near, x, _ = self._near(k)
-        others = near != k
+        rows, x, _ = self._near(k)
+        others = rows != k
         if others.all() or others.sum() < 2:
             return 0j, 0.0
-        near, x = near[others], x[others]
+        rows, x = rows[others], x[others]
         weights = np.linalg.inv(np.vander(x, len(x), increasing=True))[0]
-        centre, angle = weights @ self.centre[near], weights @ self.angle[near]
+        centre, angle = weights @ self.centre[rows], weights @ self.angle[rows]
         return complex(self.centre[k] - centre), float(self.angle[k] - angle)
 
     def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
         """Frames that tell the second derivative at a frame that is tracked, and their weights [1 / s^2]."""
-        near, x, tracked = self._near(k)
-        if len(near) < 3 or not tracked:
+        rows, x, tracked = self._near(k)
+        if len(rows) < 3 or not tracked:
             return np.array([k]), np.zeros(1)
-        return near, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
+        return rows, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
 
     def at(self, k: int) -> Local | None:
         """Polynomials through the nearest poses on both sides; None where too few are near."""
-        near, x, tracked = self._near(k)
-        if len(near) < 3 or (not tracked and not (x.min() < 0 < x.max())):
+        rows, x, tracked = self._near(k)
+        if len(rows) < 3 or (not tracked and not (x.min() < 0 < x.max())):
             return None
         powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]
-        c, a = powers @ self.centre[near], powers @ self.angle[near]
+        c, a = powers @ self.centre[rows], powers @ self.angle[rows]
         place, angle = (self.centre[k], self.angle[k]) if tracked else (c[0], a[0])
         pose, h = Pose(complex(place), float(angle)), self.interval
         rate, bend = complex(c[1]) / h, 2 * complex(c[2]) / h**2

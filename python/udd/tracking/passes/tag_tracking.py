@@ -173,8 +173,8 @@ def _laid(
         **exposure_estimate(Exposure(open_for or 0.0, np.inf if open_for is None else 0.0), wanted),
     }
     view, colours = np.ones(shape, dtype=bool), np.zeros((len(marks), 2))
-    known = TrackerState(look, view, colours, open_for or 0.0, 255.0, None, estimates)
-    return Tracks.of(frames), known
+    state = TrackerState(look, view, colours, open_for or 0.0, 255.0, None, estimates)
+    return Tracks.of(frames), state
 
 
 def _displaced(points: Complexes, places: Complexes) -> Complexes:

@@ -59,15 +59,15 @@ def strains(tracks: Tracks, look: DiskAppearance) -> tuple[Array, Array]:
     for k in np.flatnonzero(short & (np.isfinite(left[..., 0]).sum(axis=1) >= 4)):
         ok = np.isfinite(left[k, :, 0])
         arm = (places * np.exp(1j * angle[k]))[ok] / look.reach
-        u, v, one, none = arm.real, arm.imag, np.ones(int(ok.sum())), np.zeros(int(ok.sum()))
+        u, v, unit, none = arm.real, arm.imag, np.ones(int(ok.sum())), np.zeros(int(ok.sum()))
         design = np.concatenate(
-            [np.column_stack([u, v, none, one, none, -v]), np.column_stack([none, u, v, none, one, u])]
+            [np.column_stack([u, v, none, unit, none, -v]), np.column_stack([none, u, v, none, unit, u])]
         )
         if np.linalg.cond(design) > 50:
             continue
-        found = np.linalg.lstsq(design, np.concatenate([left[k, ok, 0], left[k, ok, 1]]), rcond=None)[0]
+        solution = np.linalg.lstsq(design, np.concatenate([left[k, ok, 0], left[k, ok, 1]]), rcond=None)[0]
         rows.append(k)
-        out.append(found[:3] / look.reach)
+        out.append(solution[:3] / look.reach)
     return np.array(rows, dtype=int), np.array(out).reshape(-1, 3)
 
 

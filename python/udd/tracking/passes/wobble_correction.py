@@ -65,7 +65,7 @@ class WobbleCorrection:
 
 
 def correct_wobble(
-    tracks: Tracks, look: DiskAppearance, found: Wobble, before: WobbleCorrection | None = None
+    tracks: Tracks, look: DiskAppearance, turning: Wobble, before: WobbleCorrection | None = None
 ) -> WobbleCorrection | None:
     """Each frame's foreshortening by what its pose left over; None where no frame shows all marks.
 
@@ -74,7 +74,7 @@ def correct_wobble(
     frames in
     which they were displaced. `before`: what the marks that the tracks come from were displaced for.
     """
-    across = complex(np.exp(1j * found.axis))
+    across = complex(np.exp(1j * turning.axis))
     tracked = tracks.tracked
     frames = {int(k): _Frame.of(tracks, look, int(k)) for k in np.flatnonzero(tracked)}
     whole = [k for k in frames if np.isfinite(tracks.chi2[k]).all()]
@@ -82,8 +82,9 @@ def correct_wobble(
         return None
     n = len(tracks)
     short = np.zeros(n) if before is None else before.short.copy()
-    larger, noise = (float(np.median(x)) for x in np.transpose([frames[k].told(across) for k in whole]))
-    usual, prior = -(found.amplitude**2) / 4, found.amplitude**4 / SINE  # mean and variance of cos(A sin) - 1
+    larger, noise = (float(np.median(x)) for x in np.transpose([frames[k].stretch(across) for k in whole]))
+    # mean and variance of cos(A sin) - 1
+    usual, prior = -(turning.amplitude**2) / 4, turning.amplitude**4 / SINE
 
     def further(k: int, places: Complexes) -> tuple[Array, Array, float, float]:
         """Return change of pose, residual, change of foreshortening and its precision for marks."""
@@ -149,11 +150,11 @@ class _Frame:
         pose = self.solved @ value
         return pose, value - self.design @ pose
 
-    def square(self, one: Array, other: Array) -> float:
+    def square(self, first: Array, other: Array) -> float:
         """Product by weight."""
-        return float(one @ self.weight @ other)
+        return float(first @ self.weight @ other)
 
-    def told(self, across: complex) -> tuple[float, float]:
+    def stretch(self, across: complex) -> tuple[float, float]:
         """Stretch along the axis, and what is left for each spare coordinate in units of its noise."""
         rests = np.stack([self.response(self.across(d))[1] for d in (across, 1j * across)], axis=1)
         found = np.linalg.solve(rests.T @ self.weight @ rests, rests.T @ self.weight @ self.left)
