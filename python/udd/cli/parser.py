@@ -25,6 +25,7 @@ from . import (
     lyapunov,
     paper,
     poincare,
+    sheet,
     simulate,
     sweep,
     track,
@@ -34,7 +35,7 @@ from .suggestions import meant
 #: The commands, in the groups in which the help lists them.
 GROUPS = {
     "begin": (demo, example, app),
-    "films": (film, track),
+    "films": (sheet, film, track),
     "measurements": (fit, discover, forecast, effects),
     "dynamics": (simulate, lyapunov, poincare, bifurcation, basins, continuation, sweep),
     "more": (paper, completion),

@@ -290,7 +290,8 @@ class StandardLight:
 def light_of_pq(code: float) -> float:
     """Return the light of a PQ code from 0 to 1 (SMPTE ST 2084); 1 is diffuse white, 203 cd/m^2 (BT.2408)."""
     root = code ** (32 / 2523)
-    return 10000 / 203 * (max(root - 107 / 128, 0.0) / (2413 / 128 - 2392 / 128 * root)) ** (8192 / 1305)
+    power = max(root - 107 / 128, 0.0) / (2413 / 128 - 2392 / 128 * root)
+    return 10000 / 203 * math.pow(power, 8192 / 1305)
 
 
 def light_of_hlg(code: float) -> float:
