@@ -26,7 +26,6 @@ SHARE = 0.25  # of all that can be followed that must
 BACK = 0.7  # pixels by which a point may come back elsewhere when it is followed back
 OFF = 0.7  # pixels by which a point may miss the common motion
 SURE = 5.0  # standard errors by which a view may be off without being another
-CLOSE = 0.3  # pixels: a view so close to the first one needs no resampling before points are followed
 STEADY = 0.2  # pixels: a camera that moves less is at rest
 AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
 PATCH = 5  # pixels about a point whose light is compared
@@ -170,7 +169,7 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     background = Background(whole[0].y, film.light)
     if not background.learned(whole):
         return None
-    seen = background.follow([burst[0] for burst in look_over.bursts])
+    seen = background.follow(whole[::2])
     if seen.known.mean() < KNOWN or (seen.steady and seen.as_bright):
         return None
     moved = background.follow(film.pictures())
@@ -267,8 +266,6 @@ class Background:
         """Views to start from, and the picture as it would be from the first one's, about as bright."""
         y = _as_light(y, float(np.median(self.first[::4, ::4])) / max(float(np.median(y[::4, ::4])), 1.0))
         factor, shift = self.view
-        if abs(factor - 1) * abs(self.middle) + abs((factor - 1) * self.middle + shift) < CLOSE:
-            factor, shift = 1 + 0j, 0j
         yield factor, shift, _seen_from(y, factor, shift)
         if abs(factor - 1) + abs(shift) > 0.5:
             yield 1 + 0j, 0j, y
