@@ -1,5 +1,5 @@
-# Everything happens in .venv, made from requirements/*.txt (pinned, with hashes); nothing else is set up
-# on the machine. Needed beforehand: a Rust toolchain, Python 3.11+ and make.
+# All targets use .venv, made from requirements/*.txt (pinned, with hashes), and install nothing else on
+# the machine. They need a Rust toolchain, Python 3.11 or newer, and make.
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -9,9 +9,9 @@ MAKEFLAGS += --no-builtin-rules
 
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PY := $(BIN)/python
-# The interpreter that makes .venv: the first of these that is 3.11 or newer.
+# The interpreter that makes .venv: the first in this list with version 3.11 or newer.
 PYTHONS := $(or $(PYTHON),python3 python3.14 python3.13 python3.12 python3.11 python)
-# pyo3 looks at this interpreter, whatever else is on the PATH.
+# pyo3 compiles for this interpreter, not for the first one on the PATH.
 export PYO3_PYTHON := $(CURDIR)/$(PY)
 # Python's own settings must not leak into .venv.
 unexport PYTHONPATH PYTHONHOME
@@ -19,20 +19,20 @@ unexport PYTHONPATH PYTHONHOME
 # The peers of `bench-peers` live in an environment of their own.
 PEERS := .venv-peers/$(notdir $(BIN))
 
-# Says what is done, and then how many seconds it took.
+# Print what a step does, then its seconds.
 STEP := @bash .ci/step
 PIP := $(PY) -m pip install --disable-pip-version-check --progress-bar off --no-input
 EDITABLE := $(PIP) --quiet --no-deps --no-build-isolation --editable .
-# Of what pip says, each download with its size; errors go past this.
+# Keep only pip's lines on downloads, with sizes; errors go to the terminal directly.
 BRIEFLY := grep --line-buffered -E '^==>|(Downloading|Using cached) .*\.whl \('
 
-# One goal after another, whatever -j says: two of them would install into .venv at once. Where everything is
-# installed, BESIDE=1 lets -j do several.
+# Make one goal after another even with -j: two goals would install into .venv at the same time. If everything
+# is installed already, BESIDE=1 lets -j run several goals.
 ifndef BESIDE
 .NOTPARALLEL:
 endif
 
-# What the compiled module is made of; cargo itself decides what to compile again.
+# Sources of the compiled module; cargo decides which of them to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
 .PHONY: help install edit demo docs test test-rust test-python test-slow fuzz lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-crossings bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
@@ -40,10 +40,10 @@ SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-install: .venv/.ready-user ## make .venv with all that udd can use (no docs, test or lint), and the release build in it
+install: .venv/.ready-user ## make .venv with all extras of udd (no docs, test or lint) and the release build
 
-# What needs the release build makes it again.
-edit: .venv/.has-build .venv/.has-user .venv/.has-test ## for who changes the Rust core: after a changed line a module in seconds, at half of the release's speed
+# Targets that need the release build compile it again.
+edit: .venv/.has-build .venv/.has-user .venv/.has-test ## compile the changed Rust core in seconds; the module runs half as fast as the release build
 	@rm -f .venv/.module
 	$(STEP) "compiling what changed" env VIRTUAL_ENV=$(CURDIR)/.venv $(BIN)/maturin develop --profile dev --locked --skip-install
 	@[ -e .venv/.udd ] || { MATURIN_PEP517_ARGS="--locked --profile dev" $(EDITABLE) && touch .venv/.udd; }
@@ -62,7 +62,7 @@ test-rust: ## only the tests of the Rust core; needs no Python
 test-python: .venv/.ready-test ## only the tests of the Python package (ARGS="-k section" for some of them)
 	$(STEP) "pytest" $(PY) -m pytest -n auto --dist worksteal --durations=25 $(ARGS)
 
-test-slow: .venv/.ready-test ## the tests that `make test` leaves out: what faster ones ask, more precisely
+test-slow: .venv/.ready-test ## tests that `make test` skips: stricter versions of faster tests
 	$(STEP) "pytest, the slow tests" $(PY) -m pytest -m nightly -n auto --durations=0 $(ARGS)
 
 fuzz: .venv/.ready-test ## hostile inputs for an hour: formulas, tables, files, films, arguments (ARGS="--minutes 5 --kinds csv,files")
@@ -131,7 +131,7 @@ bench-tracker: .venv/.ready-user ## the tracker on films with every defect in tu
 bench-peers: .venv-peers/.udd ## udd beside SciPy, numba, heyoka, ...: print the table (ARGS=--quick for a smoke run)
 	cd benches/python && PYTHONPATH=. $(CURDIR)/$(PEERS)/python -m peers $(ARGS)
 
-# All is resolved together, with today's versions; each list is that part of it which it needs.
+# Resolve all groups together, with the current versions; each list is a part of that result.
 LOCK = .venv/lock/$(notdir $(BIN))/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
   --no-emit-index-url --no-emit-find-links --no-annotate --custom-compile-command "make lock"
 PART = $(LOCK) --constraint .venv/lock/all.txt --output-file
@@ -154,7 +154,7 @@ clean: ## remove .venv and everything that was built
 	find python tests benches -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f python/udd/_core*.so python/udd/_core*.pyd
 
-# --- the steps behind `install`, `demo` and the like; a stamp file marks each, so that only what changed is done again
+# --- steps of `install`, `demo` and the like; a stamp file marks each, so make repeats only steps that changed
 
 .venv/.made:
 	@python=; for p in $(PYTHONS); do \
@@ -170,30 +170,30 @@ clean: ## remove .venv and everything that was built
 	fi
 	@touch $@
 
-# The packages of one list of requirements/.
+# Packages of one list in requirements/.
 .venv/.has-%: requirements/%.txt .venv/.made
 	$(STEP) "packages of requirements/$*.txt" $(PIP) --require-hashes --no-deps --only-binary :all: -r $< | $(BRIEFLY)
 	@touch $@
 
-# The tests and the documentation use all of udd.
+# Tests and documentation use all extras of udd.
 .venv/.has-test .venv/.has-docs: .venv/.has-user
 
-# The module is compiled into python/udd, which needs only maturin.
+# Compile the module into python/udd; this needs only maturin.
 .venv/.module: .venv/.has-build $(SOURCES)
 	$(STEP) "compiling the module" env VIRTUAL_ENV=$(CURDIR)/.venv $(BIN)/maturin develop --release --locked --skip-install
 	@touch $@
 
-# The package in .venv points to python/udd; this is done again only where its description changes.
+# Point the package in .venv to python/udd; repeat this only if the package's metadata change.
 .venv/.udd: pyproject.toml Cargo.toml | .venv/.module
 	$(STEP) "udd into .venv" env MATURIN_PEP517_ARGS=--locked $(EDITABLE)
 	@touch $@
 
-# All lists that the checks need, one after the other.
+# All lists for the checks, one after the other.
 .venv/.packages: $(addprefix requirements/,build.txt user.txt test.txt lint.txt docs.txt) .venv/.made
 	+@$(MAKE) --no-print-directory BESIDE= $(addprefix .venv/.has-,user test lint docs)
 	@touch $@
 
-# Packages are downloaded while the module is compiled.
+# Download packages while the module compiles.
 .venv/.ready-%: $(wildcard requirements/*.txt) $(SOURCES)
 	+@$(MAKE) --no-print-directory -j2 BESIDE=1 .venv/.has-$* .venv/.module
 	+@$(MAKE) --no-print-directory .venv/.udd
@@ -205,7 +205,7 @@ clean: ## remove .venv and everything that was built
 	$(PY) -m pip install --disable-pip-version-check --progress-bar off --quiet --only-binary :all: -r $<
 	@touch $@
 
-# --- the same for `bench-peers`; a peer that cannot be installed here is a note in the table
+# --- steps of `bench-peers`; the table notes each peer that cannot be installed here
 
 .venv-peers/.deps: benches/python/requirements-peers.txt
 	rm -rf .venv-peers
