@@ -46,12 +46,12 @@ def dataset(
         unit = units.get(name, "")
         return own, np.asarray(values), {"units": unit} if unit else {}
 
-    found: xr.Dataset = require_xarray().Dataset(
+    labelled_data: xr.Dataset = require_xarray().Dataset(
         {name: labelled(name, values, dims) for name, values in columns.items()},
         {name: labelled(name, values, [name]) for name, values in coords.items()},
         attrs,
     )
-    return found
+    return labelled_data
 
 
 def of_states(

@@ -15,7 +15,7 @@ def is_a(value: object, hint: Any) -> bool:
     if hint is Any:
         return True
     if kind in (Union, UnionType):
-        return any(is_a(value, one) for one in inner)
+        return any(is_a(value, item) for item in inner)
     if kind is Literal:
         return value in inner
     if kind is np.ndarray:
@@ -23,7 +23,7 @@ def is_a(value: object, hint: Any) -> bool:
     if kind is tuple and inner[-1] is not Ellipsis:
         return isinstance(value, tuple) and len(value) == len(inner) and all(map(is_a, value, inner))
     if kind in (list, tuple):
-        return isinstance(value, kind) and all(is_a(one, inner[0]) for one in value)
+        return isinstance(value, kind) and all(is_a(item, inner[0]) for item in value)
     if kind in (dict, Mapping):
         return isinstance(value, Mapping) and all(
             is_a(k, inner[0]) and is_a(x, inner[1]) for k, x in value.items()

@@ -25,12 +25,12 @@ _DOTTED = re.compile(rf"(?:^|[\[{{,]){_KEY}(?:\.{_KEY}){{{_DEEPEST},}}", re.MULT
 def table(
     where: str,
     data: object,
-    known: Collection[str] | None = None,
+    allowed: Collection[str] | None = None,
     needed: Collection[str] = (),
     *,
     error: type[UddError] = ModelError,
 ) -> dict[str, Any]:
-    """A copy of a table that has each of the keys `needed`, and none but those `known`.
+    """A copy of a table that has each of the keys `needed`, and none but those `allowed`.
 
     Raises
     ------
@@ -40,8 +40,8 @@ def table(
     if not isinstance(data, Mapping):
         raise error(f"{where} must be a table of names and values, not {_shown(data)}")
     for key in data:
-        if not isinstance(key, str) or len(key) > _LONGEST or (known is not None and key not in known):
-            raise error(f"{where} has no {_shown(key)}; it has {', '.join(known or ['short names'])}")
+        if not isinstance(key, str) or len(key) > _LONGEST or (allowed is not None and key not in allowed):
+            raise error(f"{where} has no {_shown(key)}; it has {', '.join(allowed or ['short names'])}")
     for key in needed:
         if key not in data:
             raise error(f"{where} does not say its {key}")

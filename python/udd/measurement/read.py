@@ -202,13 +202,13 @@ def pairs(text: str, what: str) -> dict[str, str]:
     MeasurementError
         A name or a column is missing.
     """
-    found = {}
-    for one in text.split(","):
-        name, equals, column = (part.strip() for part in one.partition("="))
+    mapping = {}
+    for pair in text.split(","):
+        name, equals, column = (part.strip() for part in pair.partition("="))
         if not name or (equals and not column):
-            raise MeasurementError(f"{what} must look like theta=position, not {one.strip()!r}")
-        found[name] = column or name
-    return found
+            raise MeasurementError(f"{what} must look like theta=position, not {pair.strip()!r}")
+        mapping[name] = column or name
+    return mapping
 
 
 def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str, str]:
@@ -308,15 +308,15 @@ def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, .
 
 def _quality(frames: Frames, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """Return the quality of each frame of a tracked film. In other files the names may mean anything."""
-    found: dict[str, NDArray[Any]] = {}
+    quality: dict[str, NDArray[Any]] = {}
     for name in (n for n in (*QUALITY, *CAMERA_COLUMNS) if frames.has(n) and n not in names):
         if name == "method":
-            found[name] = frames.words(name)
+            quality[name] = frames.words(name)
         else:
-            found[name] = frames.column(name)
-            if name == "marks" and np.isfinite(found[name]).all():
-                found[name] = found[name].astype(np.int64)
-    return found
+            quality[name] = frames.column(name)
+            if name == "marks" and np.isfinite(quality[name]).all():
+                quality[name] = quality[name].astype(np.int64)
+    return quality
 
 
 def _located(table: Table, make: Callable[[], Measurement]) -> Measurement:

@@ -25,18 +25,18 @@ class Units:
 
     Attributes
     ----------
-    known : frozenset of str
+    standard : frozenset of str
         The columns of a disk, of a pendulum or of a bob: an unknown unit, or a unit of another quantity, is
         refused. In a user's own model the same names may mean anything.
     mapped : bool
         True if the user gave the coordinates of the columns.
-    own : bool
+    of_user_model : bool
         True if the columns are states of a user's own model, without a mapping.
     """
 
-    known: frozenset[str] = frozenset()
+    standard: frozenset[str] = frozenset()
     mapped: bool = False
-    own: bool = False
+    of_user_model: bool = False
 
 
 @dataclass(frozen=True)
@@ -302,19 +302,19 @@ def own_inputs(table: Table) -> dict[str, InputSignal]:
     """The inputs that a file of the package holds: ``input:NAME``, over ``t:NAME`` where that is there."""
     holds = table.meta.get("input_hold")
     places = {heading.name: k for k, heading in enumerate(table.headings)}
-    found = {}
+    signals = {}
     for name in (n.removeprefix("input:") for n in places if n.startswith("input:")):
-        own = f"t:{name}" in places
-        if not own and "t" not in places:
+        has_clock = f"t:{name}" in places
+        if not has_clock and "t" not in places:
             continue
         t, values = (
-            table.numbers(places[f"t:{name}" if own else "t"]),
+            table.numbers(places[f"t:{name}" if has_clock else "t"]),
             table.numbers(places[f"input:{name}"]),
         )
-        there = ~np.isnan(t if own else values)
+        there = ~np.isnan(t if has_clock else values)
         hold = holds.get(name, "linear") if isinstance(holds, dict) else "linear"
-        found[name] = named_signal(name, t[there], values[there], hold)
-    return found
+        signals[name] = named_signal(name, t[there], values[there], hold)
+    return signals
 
 
 def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
@@ -334,9 +334,9 @@ def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
     base, base_unit = COUNTED.get(plain), in_base_units(unit)
     factor = size(name, unit)
     if base is not None and factor is None:
-        if base_unit is not None and (base != "m" or plain in units.known or units.mapped):
+        if base_unit is not None and (base != "m" or plain in units.standard or units.mapped):
             raise MeasurementError(f"{name} is counted in {base}, but the column is called {heading.raw}")
-        if base_unit is None and plain in units.known:
+        if base_unit is None and plain in units.standard:
             raise MeasurementError(f"the unit {unit[:80]!r} of {name} is not known; write {USUAL[base]}")
         if base_unit is None and base != "m":
             return Conversion(kept=f"the unit {unit[:80]!r} of {name} is not known, its numbers stay")
@@ -344,10 +344,10 @@ def _conversion(name: str, heading: Heading, units: Units) -> Conversion:
         base_unit = (factor, base)
     if base_unit is None or base_unit[0] == 1.0:
         return Conversion()
-    if units.own and base_unit[1].startswith("m"):
+    if units.of_user_model and base_unit[1].startswith("m"):
         # A model may count in mm; what it takes the sine of is in rad.
         return Conversion(kept=f'{name} stays in {unit} (columns="{name}={name}" makes it {base_unit[1]})')
-    if base is None and not units.mapped and not units.own:
+    if base is None and not units.mapped and not units.of_user_model:
         return Conversion()
     return Conversion(base_unit[0], f"{unit} to {base_unit[1]}")
 

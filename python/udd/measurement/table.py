@@ -124,21 +124,23 @@ class Measurement(Drawable):
             )
         n, m = table.shape
         flags = np.full(n, "") if flag is None else np.array(flag, dtype=np.str_)
-        own = None if rho is None else _numbers("rho", rho)
+        correlations = None if rho is None else _numbers("rho", rho)
         put = object.__setattr__
         put(self, "t", times)
         put(self, "values", table)
         put(self, "sigma", None if sigma is None else _columns("sigma", sigma, names))
-        if own is not None and own.size != n * (m * (m - 1) // 2):
-            raise MeasurementError(f"rho has shape {own.shape}, expected {(n, m * (m - 1) // 2)}")
-        put(self, "rho", None if own is None else own.reshape(n, m * (m - 1) // 2))
+        if correlations is not None and correlations.size != n * (m * (m - 1) // 2):
+            raise MeasurementError(f"rho has shape {correlations.shape}, expected {(n, m * (m - 1) // 2)}")
+        put(self, "rho", None if correlations is None else correlations.reshape(n, m * (m - 1) // 2))
         put(self, "flag", flags)
         put(self, "meta", dict(meta or {}))
         put(self, "names", names)
-        known = {name: np.array(column) for name, column in (quality or {}).items()}
-        put(self, "quality", known)
-        if (odd := next((name for name, column in known.items() if column.shape != (n,)), None)) is not None:
-            raise MeasurementError(f"{odd} has shape {known[odd].shape}, expected {(n,)}")
+        quality_columns = {name: np.array(column) for name, column in (quality or {}).items()}
+        put(self, "quality", quality_columns)
+        if (
+            odd := next((name for name, column in quality_columns.items() if column.shape != (n,)), None)
+        ) is not None:
+            raise MeasurementError(f"{odd} has shape {quality_columns[odd].shape}, expected {(n,)}")
         if times.shape != (n,) or flags.shape != (n,) or m != len(names):
             raise MeasurementError(f"t, values and flag have different lengths: {times.shape}, {table.shape}")
         if self.sigma is not None and self.sigma.shape != (n, m):
@@ -146,7 +148,7 @@ class Measurement(Drawable):
         check(self, lambda i: f"row {i}")
         put(self, "inputs", input_signals(inputs, times))
         _check_inputs(self)
-        for array in (times, table, self.sigma, self.rho, flags, *known.values()):
+        for array in (times, table, self.sigma, self.rho, flags, *quality_columns.values()):
             if array is not None:
                 array.setflags(write=False)
 
@@ -272,14 +274,18 @@ class Measurement(Drawable):
             units |= {f"sigma_{name}": units[name] for name in self.names if name in units}
         if len(self.flag):
             columns["flag"] = self.flag
-        found = dataset(columns, ["t"], units, {"t": self.t})
+        labelled_data = dataset(columns, ["t"], units, {"t": self.t})
         for name, signal in self.inputs.items():
             at = "t" if self.on_rows(name) else f"t_{name}"
             if at != "t":
-                found = found.assign_coords({at: (at, signal.t, {"units": "s"})})
+                labelled_data = labelled_data.assign_coords({at: (at, signal.t, {"units": "s"})})
             unit = _unit_of(self.meta, name)
-            found[name] = (at, signal.values, {"hold": signal.hold} | ({"units": unit} if unit else {}))
-        return found
+            labelled_data[name] = (
+                at,
+                signal.values,
+                {"hold": signal.hold} | ({"units": unit} if unit else {}),
+            )
+        return labelled_data
 
     @checked_arguments(error=MeasurementError)
     def on_rows(self, name: str) -> bool:

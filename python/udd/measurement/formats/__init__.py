@@ -54,7 +54,7 @@ FORMATS = (
     Format("NumPy archive", _npz, numpy_arrays.read),
     Format("NumPy array", lambda head, _suffix: head.startswith(b"\x93NUMPY"), numpy_arrays.read_one),
     Format("archive of tables", lambda head, _suffix: head.startswith((b"PK\3\4", b"PK\5\6")), zipped.read),
-    *(Format(one.what, one.is_so, one.read) for one in other_xml.KINDS),
+    *(Format(kind.what, kind.is_so, kind.read) for kind in other_xml.KINDS),
     Format(
         "Tracker project",
         lambda head, suffix: (

@@ -61,13 +61,15 @@ def tables_of(
     for name, column in columns.items():
         by_length.setdefault(len(column), {})[name] = column
     tables = []
-    for own in by_length.values():
+    for same_length in by_length.values():
         named = [
             replace(heading, raw=name, unit=stated.get(name) or heading.unit)
-            for name, heading in zip(own, headings([_last(name) for name in own]), strict=True)
+            for name, heading in zip(
+                same_length, headings([_last(name) for name in same_length]), strict=True
+            )
         ]
-        memory.take(sum(8 * column.size for column in own.values() if column.dtype != np.float64))
-        whole: list[Any] = [np.asarray(column, dtype=np.float64) for column in own.values()]
+        memory.take(sum(8 * column.size for column in same_length.values() if column.dtype != np.float64))
+        whole: list[Any] = [np.asarray(column, dtype=np.float64) for column in same_length.values()]
         tables.append(Table(named, whole, about, memory=memory))
     return [_named(tables, given)] if given is not None else tables
 

@@ -145,15 +145,15 @@ def _columns(
     columns: list[NDArray[np.float64] | None] = [np.empty(most) for _ in range(rows.columns)]
     done = torn = width = 0
     narrowest, cut = rows.columns, ""
-    for found, block, last in _with_last(rows.blocks()):
+    for numbers_of_lines, block, last in _with_last(rows.blocks()):
         if last and done + len(block) > 1:
             narrowest = min([narrowest, *map(len, block[:-1])])
             if len(block[-1]) < narrowest:
-                cut = f"line {found[-1]}, the last, is cut off, and is passed over"
-                found, block = found[:-1], block[:-1]
+                cut = f"line {numbers_of_lines[-1]}, the last, is cut off, and is passed over"
+                numbers_of_lines, block = numbers_of_lines[:-1], block[:-1]
         narrowest = min([narrowest, *map(len, block)])
         end = done + len(block)
-        numbers[done:end] = found
+        numbers[done:end] = numbers_of_lines
         for k, cells in enumerate(islice(chain(zip_longest(*block), repeat((None,))), rows.columns)):
             column = columns[k]
             if block and column is not None and not _fill(column[done:end], cells, comma):
@@ -218,17 +218,19 @@ def _header(
     head = next((i for i, row in enumerate(first) if _has_time(row)), None)
     if given is not None:
         if head is None:
-            found = _first_row(lines, mark, lambda row: len(row) > 1 and all(_counts(c, comma) for c in row))
-            return given, sum(1 for _ in lines) if found is None else found[0], []
+            first_row = _first_row(
+                lines, mark, lambda row: len(row) > 1 and all(_counts(c, comma) for c in row)
+            )
+            return given, sum(1 for _ in lines) if first_row is None else first_row[0], []
         return given, head + 1, first[head - 1] if head else []
     if head is not None:
         return first[head], head + 1, first[head - 1] if head else []
-    found = _first_row(lines, mark, lambda row: all(_counts(c, comma) for c in row)) or _first_row(
+    first_row = _first_row(lines, mark, lambda row: all(_counts(c, comma) for c in row)) or _first_row(
         lines, mark, lambda row: sum(bool(c) and _counts(c, comma) for c in row) > 1
     )
-    if found is None:
+    if first_row is None:
         raise _without_numbers(lines, mark)
-    at, names, above = found
+    at, names, above = first_row
     if len(names) < 2:
         raise MeasurementError(
             'no header names the columns: say what they are, for example columns="t,theta,_"'

@@ -31,14 +31,14 @@ class Rows:
         for numbers, lines in self.lines.blocks():
             skip = max(0, self.start - before)
             before += len(lines)
-            found, rows = [], []
+            numbers_of_lines, rows = [], []
             for number, row in zip(numbers[skip:], split(lines[skip:], self.mark), strict=True):
                 for cell in row:
                     if cell and cell.lower() != "nan":
-                        found.append(number)
+                        numbers_of_lines.append(number)
                         rows.append(row)
                         break
-            yield found, rows
+            yield numbers_of_lines, rows
 
     def column(self, k: int) -> Iterator[tuple[str | None, int]]:
         """Yield the cells of a column (None where a row ends before it), and how many each row has."""

@@ -126,16 +126,16 @@ def _frames(owner: ElementTree.Element) -> Iterator[tuple[int, ElementTree.Eleme
 
 def _coordinates(system: ElementTree.Element) -> list[tuple[int, list[float]]]:
     """Origin [px], angle [rad, counterclockwise], scales [px per unit], by the frames where they were set."""
-    found = []
-    for n, one in _frames(system):
-        origin = [_number(one, name, math.nan) for name in ("xorigin", "yorigin")]
-        scales = [_number(one, name, math.nan) for name in ("xscale", "yscale")]
+    systems = []
+    for n, element in _frames(system):
+        origin = [_number(element, name, math.nan) for name in ("xorigin", "yorigin")]
+        scales = [_number(element, name, math.nan) for name in ("xscale", "yscale")]
         if not all(scales) or not np.isfinite([*origin, *scales]).all():
             raise MeasurementError("the Tracker project has coordinates without an origin or a scale")
-        found.append((n, [*origin, math.radians(_number(one, "angle", 0.0)), *scales]))
-    if not found:
+        systems.append((n, [*origin, math.radians(_number(element, "angle", 0.0)), *scales]))
+    if not systems:
         raise MeasurementError("the Tracker project has no coordinates")
-    return sorted(found)
+    return sorted(systems)
 
 
 def _world(coordinates: list[tuple[int, list[float]]], n: int, x: float, y: float) -> tuple[float, float]:
