@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,6 +116,7 @@ class Model:
     """Its properties apart from the equations."""
     _plain: ClassVar[tuple[str, ...]]
     _options: ClassVar[tuple[str, ...]] = ("effects",)
+    _written: ClassVar[type[FormulaModel]]
     effects: tuple[Effect, ...]
 
     def __new__(
@@ -130,10 +131,13 @@ class Model:
         delays: Mapping[str, str] | None = None,
         observe: Mapping[str, Expression] | None = None,
     ) -> FormulaModel:
-        """A user's own model is one of a subclass, like those that are built in."""
-        from .formula_model import FormulaModel
+        """Make a user-defined model, of the subclass that declares itself ``written``."""
+        return cls._written.__new__(cls._written)
 
-        return FormulaModel.__new__(FormulaModel)
+    def __init_subclass__(cls, *, written: bool = False, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if written:
+            Model._written = cast("type[FormulaModel]", cls)
 
     slow = renamed_attribute("slow", "time_scale")
 

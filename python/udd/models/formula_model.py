@@ -43,7 +43,7 @@ class FormulaText(NamedTuple):
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class FormulaModel(Model):
+class FormulaModel(Model, written=True):
     """A user's own model, as :class:`udd.Model` makes it.
 
     Attributes
