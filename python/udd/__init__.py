@@ -1,17 +1,17 @@
 """The laboratory of the upward-driven disk.
 
-Film the device, get its motion, fit the model, find what the model lacks, and explore what the
-model does.
+Film the device, measure its motion, fit the model, find what the model lacks, and explore the
+dynamics.
 """
 
 from __future__ import annotations
 
 import lazy_loader
 
-# The public names stand in __init__.pyi. Nothing is imported before it is used: `import udd` stays fast.
+# __init__.pyi lists the public names. A module is imported when it is first used, so `import udd` is fast.
 _attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-#: Names of before, which work for one release more.
+#: Old names, which keep working for one release.
 _RENAMED = {"energy_books": "energy_balance", "relatives": "related_systems"}
 
 
