@@ -143,11 +143,11 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
     Parameters
     ----------
     inflow : float
-        Of water at the top.
+        Rate of water at the top.
     leakage : float
-        Rate at which the cups lose what they hold, not negative.
+        Rate at which the cups lose water, not negative.
     friction : float
-        Rate at which the wheel would lose its spin, positive.
+        Rate at which the empty wheel loses its spin, positive.
     gravity : float
         Torque of the water, positive.
 
@@ -163,8 +163,8 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
     Notes
     -----
     Without leakage, in the unit of time ``1/friction``, this is the DLE with ``y = gravity a/friction^2``,
-    ``z = gravity b/friction^2`` and the drive ``w = gravity inflow/friction^3``; with it, Lorenz's equations
-    at b = 1.
+    ``z = gravity b/friction^2`` and the drive ``w = gravity inflow/friction^3``. With leakage, it is Lorenz's
+    equations at b = 1.
 
     References
     ----------
@@ -391,12 +391,12 @@ def pumped_swing(
     r, friction : float
         As for :func:`pendulum`, at length 1.
     depth : float
-        Standing, on the way out, the rider shortens the swing to ``1 - depth``; squatting, on the way in,
-        lengthens it to ``1 + depth``. Positive, below 1.
+        Standing, on the way out, the rider shortens the swing to ``1 - depth``. Squatting, on the way in, the
+        rider lengthens it to ``1 + depth``. Positive, below 1.
     quickness : float
         Rate at which the rider moves; positive.
     sharpness : float
-        With which the rider feels the way that the swing goes.
+        Sharpness of the rider's reaction to the direction of the swing.
 
     Returns
     -------
@@ -409,8 +409,8 @@ def pumped_swing(
 
     Notes
     -----
-    A quick rider multiplies small swings by ``((1 + depth)/(1 - depth))^(3/2)`` every half period: angular
-    momentum is kept as the rider rises at the bottom, the angle as the rider squats at the end.
+    A quick rider multiplies small swings by ``((1 + depth)/(1 - depth))^(3/2)`` every half period. The
+    angular momentum stays as the rider rises at the bottom; the angle stays as the rider squats at the end.
 
     References
     ----------
@@ -465,8 +465,8 @@ def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
     Notes
     -----
     The string winds onto the cheeks as it swings, and the bob runs along a cycloid. The arc from its lowest
-    point is ``s = sin(theta)`` in units of the string's length, and without friction ``s'' = -r s``: the
-    period is ``2 pi/sqrt(r)`` for every swing, where that of :func:`pendulum` grows with it.
+    point is ``s = sin(theta)`` in units of the string's length, and without friction ``s'' = -r s``. The
+    period is ``2 pi/sqrt(r)`` for every amplitude; that of :func:`pendulum` grows with the amplitude.
 
     References
     ----------

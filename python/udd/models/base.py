@@ -143,17 +143,17 @@ class Model:
 
     @property
     def time_scale(self) -> float:
-        """About the unit of time in which the motion takes place, that of the disk being 0.27 s."""
+        """Typical time of the motion; for the disk 0.27 s."""
         return self.profile.dynamics.time_scale
 
     @property
     def names_time(self) -> bool:
-        """Whether a formula of the rates may contain the time `t`; that of a compiled law may."""
+        """True if a formula of the rates may contain the time `t`; a compiled law may."""
         return True
 
     @property
     def kinematic(self) -> tuple[str, ...]:
-        """The states whose equation only says that another is their rate; none of a compiled law."""
+        """States whose rate is another state by definition; none for a compiled law."""
         return ()
 
     @property
@@ -180,7 +180,7 @@ class Model:
 
     @checked_arguments
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """The model with other values of some parameters.
+        """Return the model with other values of some parameters.
 
         Parameters
         ----------
@@ -208,7 +208,7 @@ class Model:
         return self._changed({n: values[n] for n in self._plain if n in values}, self._effects_with(values))
 
     def _effects_with(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
-        """The effects with other values of some parameters, named as the model's."""
+        """Return the effects with other values of some parameters, by the model's names."""
         effects = []
         for effect in self.effects:
             own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
@@ -216,7 +216,7 @@ class Model:
         return tuple(effects)
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
-        """The model with these effects instead of its own.
+        """Return the model with these effects instead of its present ones.
 
         Raises
         ------
@@ -226,7 +226,7 @@ class Model:
         return self._changed({}, self._effects(effects))
 
     def _changed(self, plain: Mapping[str, float], effects: tuple[Effect, ...]) -> Self:
-        """A copy with other numbers, checked for what would break the equations only."""
+        """Return a copy with other numbers; check only for values that break the equations."""
         new = object.__new__(type(self))
         for name, value in vars(self).items():
             object.__setattr__(new, name, value)
@@ -238,7 +238,7 @@ class Model:
         return new
 
     def _add_bristles(self) -> None:
-        """Friction treated as LuGre has a state of its own, the bristles' deflection."""
+        """Add the state of LuGre friction, the bristles' deflection."""
         names, units = type(self).state_names, type(self).state_units
         if any(effect.treatment == "lugre" for effect in self.effects):
             names, units = (*names, "bristle"), (*units, "rad")
@@ -265,7 +265,7 @@ class Model:
         return result
 
     def rates(self, t: ArrayLike, state: ArrayLike) -> NDArray[np.float64]:
-        """The right-hand side of the equations of motion.
+        """Evaluate the right-hand side of the equations of motion.
 
         Parameters
         ----------
@@ -311,7 +311,7 @@ class Model:
         return flat_t, np.broadcast_to(states, (*shape, dim)).ravel(), shape
 
     def replace(self, **changes: Any) -> Self:
-        """The model with other arguments of its constructor or other parameters.
+        """Return the model with other constructor arguments or parameters.
 
         Parameters
         ----------

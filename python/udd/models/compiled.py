@@ -14,17 +14,17 @@ class CompiledModel(Model):
     """A model whose law is compiled into the core."""
 
     def __new__(cls, *_arguments: Any, **_options: Any) -> Self:
-        """Leave everything to the initialisation, which a copy or a pickle does not need."""
+        """Create an uninitialised instance, which a copy or a pickle fills itself."""
         return object.__new__(cls)
 
 
 def beyond_the_edge(model: Model) -> Model:
-    """The equations alone: a disk that does not leave the wheels, another model as it is."""
+    """Return the equations alone: a disk without an edge, or any other model as it is."""
     return model.replace(edge="ignore") if "edge" in model._options else model
 
 
 def plain_friction(model: Model, inertia: float, omega: Floats) -> Floats:
-    """``k Omega^2`` of the plain law, from its rates where neither gravity nor the drive exerts a torque."""
+    """Compute ``k Omega^2`` of the plain law, from its rates without torque by gravity or drive."""
     plain = model.with_effects(())
     state = np.zeros((len(omega), len(plain.state_names)))
     state[:, 0] = omega

@@ -96,7 +96,7 @@ class Disk(CompiledModel):
 
     @classmethod
     def from_wheel(cls, rate: float, wheel: float = 0.03, **options: Any) -> Self:
-        """The disk driven by a wheel of this radius that turns at this rate: ``W = rate wheel``.
+        """Make a disk driven by a wheel of this radius and angular velocity: ``W = rate wheel``.
 
         Parameters
         ----------
@@ -207,7 +207,7 @@ def _mistaken_unit(model: Disk, step: float, values: Floats) -> str | None:
 
 
 def _other_units(model: Disk) -> Iterator[OtherUnit]:
-    """The drive's alone: that places or the angle are in another unit shows at once."""
+    """Yield other units of the drive; wrong units of places or of the angle show at once."""
     for k in _DECADES if model.W else ():
         drive = model.W * 10.0**k
         text = (
@@ -218,7 +218,7 @@ def _other_units(model: Disk) -> Iterator[OtherUnit]:
 
 
 def _drive_seen(t: Floats, values: Floats, seen: NDArray[np.bool_]) -> float:
-    """The mean of dZ/dT + Y dbeta/dT, m/s: no fit is needed, and hardly an effect moves it."""
+    """Compute the mean of dZ/dT + Y dbeta/dT, m/s: it needs no fit, and effects hardly change it."""
     consecutive = seen[1:] & seen[:-1]
     if not consecutive.any():
         return float("nan")

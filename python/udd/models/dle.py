@@ -66,7 +66,7 @@ class DLE(CompiledModel):
         object.__setattr__(self, "B", number("B", self.B, least=0.0))
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
-        """The dimensionless equations take no effects; use :class:`Disk`."""
+        """Refuse effects: the dimensionless equations have none; use :class:`Disk`."""
         if tuple(effects):
             raise ModelError("the dimensionless equations take no effects; use udd.Disk")
         return self

@@ -103,7 +103,7 @@ class FormulaModel(Model, written=True):
     record: int = field(compare=False)
 
     def __new__(cls, *_arguments: Any, **_options: Any) -> FormulaModel:
-        """Leave everything to the initialisation, which a copy or a pickle does not need."""
+        """Create an uninitialised instance, which a copy or a pickle fills itself."""
         return object.__new__(cls)
 
     @checked_arguments
@@ -166,7 +166,7 @@ class FormulaModel(Model, written=True):
             object.__setattr__(self, name, value)
 
     def _with(self, **fields: Any) -> Self:
-        """A copy with other fields, which are not checked."""
+        """Return a copy with other fields, unchecked."""
         changed = object.__new__(type(self))
         changed._set(**vars(self) | fields)
         return changed
@@ -178,7 +178,7 @@ class FormulaModel(Model, written=True):
 
     @property
     def equations(self) -> dict[str, str]:
-        """Each state's rate as it was given, as text, without the effects that were added."""
+        """Each state's rate as text, without added effects."""
         return dict(zip(self.state_names, self.texts, strict=True))
 
     @property
@@ -220,7 +220,7 @@ class FormulaModel(Model, written=True):
 
     @property
     def names_time(self) -> bool:
-        """Whether a formula of the rates contains the time `t` or a measured input."""
+        """True if a formula of the rates contains the time `t` or a measured input."""
         own = self._own
         variables = [*own.states, *own.inputs]
         parsed = (_core.formula_operations(text, variables, own.parameters) for text in own.equations)
@@ -228,7 +228,7 @@ class FormulaModel(Model, written=True):
 
     @property
     def kinematic(self) -> tuple[str, ...]:
-        """The states whose equation only says that another one is their rate, as in ``theta' = v``."""
+        """States whose rate is another state by definition, as in ``theta' = v``."""
         pairs = zip(self.state_names, self.texts, strict=True)
         return tuple(name for name, text in pairs if text.strip() in self.state_names)
 
@@ -355,12 +355,12 @@ class FormulaModel(Model, written=True):
 
     @property
     def late(self) -> dict[str, str]:
-        """The inputs and sensors that are late, each with its parameter: of :attr:`delays` and of effects."""
+        """Delayed inputs and sensors, each with its parameter: from :attr:`delays` and from effects."""
         pairs = ((delayed_by(effect.slots[0]), effect) for effect in self.effects)
         return dict(self.delays) | {name: f"{e.name}.{e.amplitudes[0]}" for name, e in pairs if name}
 
     def _entered(self, slot: str) -> dict[str, str]:
-        """The states whose rates a slot adds to, and the factor in front of each; none for a rate itself."""
+        """Return the states whose rates a slot adds to, with their factors; no factor for a rate itself."""
         along = along_of(slot)
         if delayed_by(slot):
             return {}
@@ -368,7 +368,7 @@ class FormulaModel(Model, written=True):
 
     @checked_arguments
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """The model with other values of some parameters.
+        """Return the model with other values of some parameters.
 
         Raises
         ------
@@ -384,7 +384,7 @@ class FormulaModel(Model, written=True):
 
     @checked_arguments
     def with_inputs(self, *records: Mapping[str, InputSignal], record: int = 0) -> Self:
-        """The model with what was measured of its inputs.
+        """Return the model with measured inputs.
 
         Parameters
         ----------
@@ -422,7 +422,7 @@ class FormulaModel(Model, written=True):
 
     @checked_arguments
     def with_term(self, equation: str, term: Expression, **amplitude: float) -> FormulaModel:
-        """The model with a term added to one of its equations.
+        """Return the model with a term added to one of its equations.
 
         Parameters
         ----------
@@ -479,7 +479,7 @@ class FormulaModel(Model, written=True):
         }
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
-        """The model with these effects instead of those added before.
+        """Return the model with these effects instead of those added before.
 
         Parameters
         ----------
@@ -522,7 +522,7 @@ class FormulaModel(Model, written=True):
         return result
 
     def replace(self, **changes: Any) -> FormulaModel:
-        """The model with other arguments of its constructor or other parameters.
+        """Return the model with other constructor arguments or parameters.
 
         Raises
         ------
@@ -562,7 +562,7 @@ FormulaModel.profile = ModelProfile(
 
 
 def _check_delay(effect: Effect, delayed: str, inputs: Sequence[str], late: Sequence[str]) -> None:
-    """Whether an effect can be the delay of an input."""
+    """Return True if an effect can be the delay of an input."""
     if delayed not in inputs:
         known = ", ".join(inputs) or "none"
         raise ModelError(f"{effect.name} delays {delayed}, but the model's inputs are {known}")
@@ -573,7 +573,7 @@ def _check_delay(effect: Effect, delayed: str, inputs: Sequence[str], late: Sequ
 
 
 def _written(effect: Effect) -> str:
-    """An effect's formula with its parameters as the core calls them."""
+    """Write an effect's formula with the core's names of its parameters."""
     assert effect.spec.core_formula is not None
     if not effect.parameters:
         return effect.spec.core_formula[1]
@@ -584,7 +584,7 @@ def _written(effect: Effect) -> str:
 
 
 def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> tuple[tuple[str, ...], ...]:
-    """A mass matrix as text, checked at a few states."""
+    """Convert a mass matrix to text and check it at a few states."""
     speeds = list(model.speeds)
     if not speeds:
         raise ModelError("a mass matrix needs coordinates: states whose equation is another state")
@@ -611,7 +611,7 @@ def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> 
 
 
 def _sensors(observe: Mapping[str, Expression] | None) -> dict[str, str]:
-    """The sensors' formulas as text, by name."""
+    """Convert the sensors' formulas to text, by name."""
     if not isinstance(observe, Mapping | None):
         raise ModelError(f"observe must be a table of sensors and formulas, not {observe!r}")
     given = {str(name): one for name, one in (observe or {}).items()}
@@ -622,7 +622,7 @@ def _sensors(observe: Mapping[str, Expression] | None) -> dict[str, str]:
 
 
 def _turning(model: FormulaModel) -> tuple[str, ...]:
-    """The sensors for which a turn of an angle is a turn, whatever the parameters' values."""
+    """Return the sensors for which a turn of an angle is a turn, for any values of the parameters."""
     values = {name: 1.1 * value + 0.0123 for name, value in model.values}
     model = model._with(delays=()).with_parameters(values)
     if model.inputs:
@@ -660,7 +660,7 @@ def _delays(
 
 
 def determinant(matrix: Sequence[Sequence[str]]) -> str:
-    """The determinant of a matrix of formulas, by its first row."""
+    """Expand the determinant of a matrix of formulas by its first row."""
     if len(matrix) == 1:
         return matrix[0][0]
     parts = (f"({one})*({cofactor(matrix, 0, k)})" for k, one in enumerate(matrix[0]))
@@ -668,7 +668,7 @@ def determinant(matrix: Sequence[Sequence[str]]) -> str:
 
 
 def cofactor(matrix: Sequence[Sequence[str]], i: int, k: int) -> str:
-    """A cofactor of a matrix of formulas; the inverse of a symmetric one is these over its determinant."""
+    """Compute a cofactor of a matrix of formulas: cofactors over the determinant give a symmetric inverse."""
     if len(matrix) == 1:
         return "1"
     rest = [[*row[:k], *row[k + 1 :]] for row in (*matrix[:i], *matrix[i + 1 :])]

@@ -232,7 +232,7 @@ def pendulum_chain(
     below = {i: " + ".join(f"m{k}" for k in links if k > i) for i in links}
 
     def moment(i: int) -> str:
-        """The first moment of link i about its joint, with the links below hanging at its end."""
+        """Compute the first moment of link i about its joint, with the further links at its end."""
         return f"(m{i}*r{i} + l{i}*({below[i]}))" if below[i] else f"m{i}*r{i}"
 
     def coefficient(i: int, j: int) -> str:
@@ -241,7 +241,7 @@ def pendulum_chain(
         return f"l{min(i, j)}*{moment(max(i, j))}"
 
     def inertia(i: int, j: int) -> str:
-        """An element of the mass matrix, with the rotors of the joints between."""
+        """Compute an element of the mass matrix, with the rotors of the joints between."""
         joints = {i, i + 1} & {j, j + 1} & set(links) if rotors is not None else set()
         turned = "".join(f" {'+' if i == j else '-'} J{k}" for k in sorted(joints))
         return coefficient(i, j) + (f"*cos(a{min(i, j)} - a{max(i, j)})" if i != j else "") + turned

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 def default_state(model: Model) -> list[float]:
-    """An initial state from which orbits reach the main attractor."""
+    """Return an initial state from which orbits reach the main attractor."""
     start = model.profile.dynamics.start
     if start is None:
         raise ModelError("where orbits of a model of your own start is yours to say: give an initial state")
@@ -45,7 +45,7 @@ class ParameterBatch:
         return int(np.prod(self.shape, dtype=np.int64))
 
     def rows(self, part: slice = slice(None)) -> Floats:
-        """All parameters of some of the orbits, shape (orbits, parameters)."""
+        """Return all parameters of some of the orbits, shape (orbits, parameters)."""
         first, last, _ = part.indices(len(self))
         names = list(self.model.parameters)
         rows = np.tile(np.array(list(self.model.parameters.values())), (last - first, 1))
@@ -95,7 +95,7 @@ def orbits_of(
 
 
 def outside_domain(model: Model, rows: Floats, starts: Floats) -> NDArray[np.bool_]:
-    """Which starts have left the wheels already, where that ends a run.
+    """Find the starts that have no contact with the wheels, if that ends a run.
 
     `rows` (n, parameters) and `starts` (n, dim) come one for each orbit, or one for all.
     """

@@ -250,7 +250,7 @@ def _other_units(model: Pendulum) -> Iterator[OtherUnit]:
 
 
 def _pace(p: Parameters) -> float:
-    """Length over inertia, which with gravity alone sets the period."""
+    """Compute length over inertia, which with gravity sets the period."""
     return float(p["length"] / p["inertia"])
 
 

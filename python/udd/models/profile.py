@@ -80,7 +80,7 @@ class DynamicsProfile:
 
     @property
     def rate_unit(self) -> str:
-        """The unit of a rate, one over the time's; 1 where the time has none."""
+        """The unit of a rate, one over the time's; 1 if time has no unit."""
         return f"1/{self.time_unit}" if self.time_unit else "1"
 
 
@@ -156,11 +156,11 @@ class OtherUnit:
 
 
 def no_unit(_model: Any, *_rows: Any) -> None:
-    """No number is known to be in a wrong unit."""
+    """Accept all units."""
 
 
 def no_units(_model: Any) -> Iterator[OtherUnit]:
-    """No other unit is known to be mistaken for the right one."""
+    """Yield no other unit."""
     return iter(())
 
 

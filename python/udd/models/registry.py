@@ -13,7 +13,7 @@ from .profile import ModelProfile
 
 
 def _compiled() -> dict[str, type[Model]]:
-    """Those that the core has, each from the file that is called like its kind."""
+    """Import the compiled models, each from the file with the name of its kind."""
     kinds = _core.model_kinds()
     for kind in kinds:
         import_module(f"{__package__}.{kind}")
@@ -27,5 +27,5 @@ MODELS: dict[str, type[Model]] = COMPILED | {FormulaModel.kind: FormulaModel}
 
 
 def profile_of(kind: str) -> ModelProfile:
-    """The profile of models of this kind: ``model.kind``, or a measurement's."""
+    """Return the profile of models of this kind: ``model.kind``, or a measurement's."""
     return MODELS[kind].profile

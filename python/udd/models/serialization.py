@@ -22,7 +22,7 @@ _MECHANISM = ("coordinates", "mass", "forces")
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
-    """The model's kind and the arguments of its constructor, an effect as its name and parameters.
+    """Return the model's kind and constructor arguments, an effect as its name and parameters.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def model_from_dict(data: object, *, fitted: bool = False) -> Model:
 
 
 def formula_model_from_dict(data: object) -> FormulaModel:
-    """The user's own model that was written down, whatever is said of its kind.
+    """Make a user-defined model from its file form, whatever its kind.
 
     Its equations are the states' rates, or those of a mechanism: ``{"mechanism": {"coordinates": {"q": "v"},
     "mass": [["m"]], "forces": ["-k*q"]}, ...}``.
@@ -120,7 +120,7 @@ def formula_model_from_dict(data: object) -> FormulaModel:
 
 
 def _mechanism_from_dict(given: dict[str, Any]) -> FormulaModel:
-    """The model of a mechanism's coordinates, mass matrix and forces."""
+    """Make the model of a mechanism from coordinates, mass matrix and forces."""
     if twice := [name for name in _ACCELERATIONS if name in given]:
         raise ModelError(
             f"a model has a mechanism (M q'' = forces) or equations that are accelerations, not both: "
@@ -135,7 +135,7 @@ def _mechanism_from_dict(given: dict[str, Any]) -> FormulaModel:
 
 
 def effect_to_dict(effect: Effect) -> dict[str, Any]:
-    """An effect as its name and parameters, or as what a user made it of."""
+    """Return an effect as its name and parameters, or as the user's arguments."""
     if effect.made is not None:
         return serialization.to_dict(effect)
     choices = {"momentum": effect.momentum, "treatment": effect.treatment}
@@ -144,7 +144,7 @@ def effect_to_dict(effect: Effect) -> dict[str, Any]:
 
 
 def effect_from_dict(data: object) -> Effect:
-    """The effect that `effect_to_dict` or a person wrote down.
+    """Make an effect from the form of `effect_to_dict`, or from a user's.
 
     Raises
     ------

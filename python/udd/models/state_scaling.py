@@ -35,7 +35,7 @@ class Coordinates:
     mirrors: tuple[Floats, ...]
 
     def __call__(self, states: Floats) -> Floats:
-        """States (..., dim) as points (..., m) whose distances mean something."""
+        """Convert states (..., dim) to points (..., m) with meaningful distances."""
         plain = (
             states[..., ~self.angle & np.isfinite(self.size)]
             / self.size[~self.angle & np.isfinite(self.size)]
@@ -44,14 +44,14 @@ class Coordinates:
         return np.concatenate([plain, np.cos(turned), np.sin(turned)], axis=-1)
 
     def speed(self, model: Model, states: Floats) -> Floats:
-        """How far states (n, dim) move in a typical time: zero at an equilibrium."""
+        """Compute the distance that states (n, dim) move in a typical time: zero at an equilibrium."""
         rates = model.rates(np.zeros(len(states)), states) * self.clock / self.size
         speed: Floats = np.abs(rates).max(axis=-1, initial=0.0)
         return speed
 
 
 def coordinates_of(model: Model, states: Floats) -> Coordinates:
-    """The coordinates for a model; `states` (n, dim) give the sizes of components that have none."""
+    """Make the coordinates for a model; `states` (n, dim) give sizes of components without one."""
     sizes, clock = _sizes(model)
     largest = np.abs(states).max(axis=0, initial=0.0)
     size = np.array(
@@ -68,7 +68,7 @@ def coordinates_of(model: Model, states: Floats) -> Coordinates:
 
 
 def probes_of(model: Model, size: Floats, seed: int, count: int = 8) -> Floats:
-    """States of no particular kind, the same in every process, of these sizes (dim,).
+    """Draw generic states of these sizes (dim,), the same in every process.
 
     If the rates are undefined at some of them, as a root is below zero, their absolute values come too.
     """
