@@ -138,7 +138,7 @@ def test_attractors_coexist_where_they_should(w: float, attractors: list[tuple[i
 def test_above_the_hopf_bifurcation_rotation_has_a_finite_basin() -> None:
     # physics.md: B = 0.2, w_H = 10/3; above it the rotation omega = y = +-sqrt(w), z = 0 is stable.
     model = udd.DLE(3.7, 0.2)
-    # The chaos beside it is a transient with a mean lifetime of 26800. A sixth of the 1024 orbits begin in it
+    # The chaotic set is a transient with a mean lifetime of 26800. A sixth of the 1024 orbits begin in it
     # and are followed from 400 points to 900, through 1600 time units, before it could pass for an attractor:
     # ten are expected to end meanwhile, and that none does has a probability of 3e-5.
     found = udd.basins(model, square(3, 32), state0=[0, 1, 0], transient=300, max_extension=4)

@@ -25,7 +25,7 @@ def test_equilibria_of_models_of_all_sizes(dim: int) -> None:
         assert np.abs(states - wanted).max(axis=1).min() < 1e-9
     near = udd.equilibria(ring(dim), near=np.full(dim, 0.5), initial_states=1)
     assert np.abs(np.array([rest.state for rest in near]) - 0.5).max(axis=1).min() < 1e-9
-    # Of d/dx at 0.5: a ring of 1.5, whose eigenvalues are 1.5 times the roots of one.
+    # The slope at 0.5 is a ring of 1.5, whose eigenvalues are 1.5 times the roots of one.
     rest = min(found, key=lambda rest: float(np.abs(rest.state - 0.5).max()))
     roots = 1.5 * np.exp(2j * np.pi * np.arange(dim) / dim)
     far = np.abs(rest.eigenvalues[:, None] - roots).min(axis=0)
@@ -42,7 +42,7 @@ def test_a_search_says_where_it_was() -> None:
 def test_a_cycle_of_a_model_without_parameters() -> None:
     oscillator = udd.Model(["x", "v"], ["v", "(1 - x^2)*v - x"])
     orbit = udd.periodic_orbit(oscillator, [2.0, 0.0], settle=50.0)
-    # Of Van der Pol's oscillator at mu = 1: period and multiplier as integrated with 30 digits elsewhere.
+    # Period and multiplier of Van der Pol's oscillator at mu = 1, from an integration with 30 digits.
     assert orbit.period == pytest.approx(6.6632868593231301, abs=1e-9)
     with_one = udd.periodic_orbit(
         udd.Model(["x", "v"], ["v", "m*(1 - x^2)*v - x"], {"m": 1.0}), [2.0, 0.0], settle=50.0

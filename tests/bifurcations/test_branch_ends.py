@@ -1,4 +1,4 @@
-"""What branches of cycles pass and end in, against values to 36 digits or published ones."""
+"""Bifurcations and ends of branches of cycles, against values to 36 digits or published ones."""
 
 from __future__ import annotations
 

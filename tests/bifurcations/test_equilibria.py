@@ -58,7 +58,7 @@ def test_quotients_of_polynomials_have_no_equilibria_at_poles() -> None:
         {"al": 0.2, "e": 0.01, "g": 1.0, "d": 0.1},
     )
     states = {tuple(rest.state.round(9) + 0.0) for rest in udd.equilibria(bazykin)}
-    # Of the last two roots of the numerators one is the pole x = -5.
+    # One of the last two roots of the numerators is the pole x = -5.
     assert {(0.0, 0.0), (100.0, 0.0), (0.0, -10.0)} < states and len(states) == 4
 
 
@@ -75,7 +75,7 @@ def test_no_equilibrium_of_a_random_quadratic_model_is_missed(seed: int) -> None
     found = udd.equilibria(model)
     states = np.array([rest.state for rest in found]).reshape(-1, 3)
     assert (np.abs(model.rates(0.0, states)) < 1e-9 * (1 + np.abs(states).max(initial=0.0)) ** 2).all()
-    # What Newton's method finds from many states.
+    # Newton's method from many states.
     x = 6.0 * random.normal(size=(400, 3))
     for _ in range(60):
         slopes = _slopes(table, x)

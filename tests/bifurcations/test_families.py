@@ -111,11 +111,11 @@ def test_what_is_not_kept_is_refused() -> None:
     # Twice the period, twice the value.
     born = udd.continuation(point, max_points=20)
     assert born.values[0] == pytest.approx(2.0 * point.value, abs=0.1)
-    # One of a family: how long it lasts is nothing that has a bound.
+    # A member of a family: its period has no bound.
     assert np.isnan(orbit.period_error)
     swing = udd.periodic_orbit(udd.Model(["x", "v"], ["v", "-sin(x)"]), [1.0, 0.0])
     assert np.isnan(swing.period_error)
-    # Of two rounds the map keeps two things to first order: energy, and what bifurcates.
+    # The map of two rounds keeps two quantities to first order: the energy and the bifurcating one.
     curve, base, _ = doubled(point._curve, point._place)
     x, y, u, v = curve.nodes(base)[0]
     slope = curve.flow.size * np.array([x + 2 * x * y, y + x**2 - y**2, u, v])
@@ -132,7 +132,7 @@ def test_pairs_of_multipliers_leave_the_unit_circle_where_another_integrator_has
     assert point.kind == "Krein collision"
 
     def discriminant(energy: float) -> float:
-        """Of the two pairs' sums, at a swing of this energy."""
+        """Return the discriminant of the two pairs' sums, at a swing of this energy."""
         start = np.arccos(-energy)
         lasts = 4 * special.ellipk((1 + energy) / 2)
 

@@ -156,7 +156,7 @@ def test_the_asymmetric_pair_doubles_and_doubles(figure_eight: udd.Branch) -> No
     for point in found.points:
         assert isinstance(point.solution, udd.PeriodicOrbit)
         assert point.solution.multipliers[0] == pytest.approx(-1.0, abs=1e-8)
-    # Of five doublings the last ratio is within 0.3 % of Feigenbaum's constant.
+    # The last ratio of five doublings is within 0.3 % of Feigenbaum's constant.
     assert found.ratios[-1] == pytest.approx(4.669201609, rel=3e-3)
     assert found.branches[0].ends[0] == "born at a symmetry breaking"
 

@@ -179,7 +179,7 @@ def test_friction_that_sticks_has_sections() -> None:
         found = udd.poincare(dry, n=100, state0=[0.0, 1.0], transient=0, t_max=60.0)
     run = udd.simulate(dry, [0.0, *found.t], [0.0, 1.0], rtol=1e-11, atol=1e-13)
     np.testing.assert_allclose(run.state[1:], found.state, atol=1e-7)
-    # It comes to rest, where it is held: no crossing comes after.
+    # It stops and sticks: no crossing follows.
     rest = udd.simulate(dry, 60.0, [0.0, 1.0])
     assert rest.events.kind[-1] == "stick"
     assert 1 < found.found < 20

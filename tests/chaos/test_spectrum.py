@@ -96,7 +96,7 @@ def test_a_chaotic_transient_is_told_as_one():
     roots = np.sort(np.roots([1.0, 1.0 + B * w, w * (1.0 + B), 2.0 * w]).real)[::-1]
     assert np.abs(found.exponents - roots).max() < 4 * found.standard_errors.max() + 1e-3
     assert 1000.0 < found.transient < 2e5 and "after a transient" in repr(found)
-    # What begins where it ends has none.
+    # An orbit that begins where it ends has none.
     there = udd.lyapunov_spectrum(udd.DLE(w, B=B), state0=found.end)
     assert there.verdict == "equilibrium" and there.transient == 0.0
 
@@ -113,7 +113,7 @@ def test_a_section_on_request():
     # The continuation of the orbit.
     next_ = udd.poincare(model, "maxima of z", 1, state0=found.end, transient=0)
     np.testing.assert_array_equal(points.state[0], next_.state[0])
-    # What is asked for beside it changes no bit of the rest.
+    # Other requests change no bit of the rest.
     alone = udd.lyapunov_spectrum(model, tol=5e-3)
     assert alone.section is None
     np.testing.assert_array_equal(alone.exponents, found.exponents)
@@ -127,7 +127,7 @@ def test_the_section_of_a_periodic_orbit_has_as_many_points_as_its_period(w, sec
     found = udd.lyapunov_spectrum(w, section=section)
     x, t = found.section.state, found.section.t
     assert found.section.outcome == "finished"
-    # They come back after `count` points, as near as a periodic orbit is told by (1e-4), and not before.
+    # They come back after `count` points, within the distance of a periodic orbit (1e-4), and not before.
     assert np.abs(x[count:] - x[:-count]).max() < 1e-3
     assert t[count] - t[0] == pytest.approx(found.period, rel=1e-4)
     apart = np.abs(x[:count, None] - x[None, :count]).max(axis=2)
@@ -218,7 +218,7 @@ def test_bad_input(call, message):
 
 @pytest.mark.slow
 def test_error_bars_are_honest():
-    """A hundred orbits: they scatter as much as their standard errors say."""
+    """A hundred orbits scatter by their standard errors."""
     starts = np.random.default_rng(5).normal(size=(100, 3))
     with pytest.warns(udd.ConvergenceWarning):
         found = [udd.lyapunov(udd.DLE(1.0), state0=s, t=3e4, tol=1e-9, with_error=True) for s in starts]

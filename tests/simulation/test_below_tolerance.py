@@ -67,7 +67,7 @@ def test_a_smaller_atol_is_right_and_silent() -> None:
         (udd.Model(["x"], ["x - x^3"]), [0.0]),
         # It falls to 1e-26, and a source brings it back.
         (udd.Model(["x"], ["-x*(1 + 0*t) + where(t > 60, 1, 0)"]), [1.0]),
-        # A population that stays extinct beside one that does not.
+        # A population that stays extinct next to one that does not.
         (udd.Model(["x", "y"], ["x*(1 - x)", "-y*(1 + x)"]), [0.1, 1.0]),
         (PREY, [1.5, 1.0]),
         (PREY, [1.5, 0.0]),

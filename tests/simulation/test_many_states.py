@@ -1,4 +1,4 @@
-"""Models with up to twelve states, some of whose numbers are filled up with idle ones."""
+"""Models with up to twelve states, whose arrays hold idle components too."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def reference(n: int, t: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_a_chain_of_oscillators_agrees_with_scipy(n: int) -> None:
     t = np.linspace(0.0, 20.0, 101)
     wanted = reference(n, t)
-    # What both make of an error of 1e-12 a step: neighbouring orbits part by e^(0.1 t) at most.
+    # Growth of an error of 1e-12 a step: neighbouring orbits diverge by e^(0.1 t) at most.
     bounds = {"dopri5": 1e-9, "dop853": 1e-9, "taylor": 1e-9, "auto": 1e-9, "rodas": 1e-7}
     for method, bound in bounds.items():
         tolerance = 1e-9 if method == "rodas" else 1e-12

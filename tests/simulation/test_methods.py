@@ -159,14 +159,14 @@ def ended(law: udd.Model, end: float, start: list[float], **options: Any) -> np.
 
 
 def differing(seed: int) -> str | None:
-    """What two methods disagree about; `""` where a law is too sensitive or too slow to tell."""
+    """The difference of two methods; `""` where a law is too sensitive or too slow to tell."""
     law, end, start = case(seed)
     if not np.isfinite(law.rates(0.0, start)).all():
         # As 0/0, which a series that knows the 0 does not see.
         return ""
     fine = ended(law, end, start, method="dop853", rtol=1e-12, atol=1e-15)
     coarse = ended(law, end, start, method="dop853", rtol=1e-9, atol=1e-12)
-    # What an error of the tolerance's size at the start grows to.
+    # The size to which an initial error of the tolerance's size grows.
     near = ended(law, end, [x * (1 + 1e-9) for x in start], method="dop853", rtol=1e-12, atol=1e-15)
     if isinstance(fine, str) or isinstance(coarse, str) or isinstance(near, str):
         # Nothing to compare with; but no method finishes where the solution blows up.

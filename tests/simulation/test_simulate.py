@@ -294,7 +294,7 @@ def test_ctrl_c_is_answered_within_0_2_s(call: str) -> None:
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     delays = np.array([line.split() for line in out.stdout.splitlines()], float)
     assert delays.shape == (3, 2), out.stderr
-    # What it worked on, on all threads, not what it waited for: a busy machine may hold up any run.
+    # CPU time on all threads, not the time spent waiting: a busy machine may delay any run.
     wall, worked = delays.T
     assert worked.min() < 0.2 * os.cpu_count() and wall.min() < 5  # type: ignore[operator]
 

@@ -39,7 +39,7 @@ def test_an_alternative_whose_name_the_model_has_is_told_apart():
     names = [f.effect.name for f in found.effects]
     assert "wave_in_v" in names and len(names) > 1
     other = next(name for name in names if name != "wave_in_v")
-    # Another wave could stand for the drag, while the model has a wave already.
+    # Another wave could replace the drag, but the model has a wave already.
     (wave,) = [c.effect for c in waves(found.baseline.model, [0.7]) if c.effect.name == "wave_in_v"]
     title, equation = "a wave", wave.equation
     doubt = Alternative(other, wave.replace(a=0.1, b=0.1), title, equation, nats=1.0, likeness=0.5)

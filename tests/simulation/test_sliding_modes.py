@@ -256,7 +256,7 @@ def test_motors_that_let_joints_go() -> None:
     assert run.outcome == "finished"
     assert kinds.count("stick") > 2
     assert kinds.count("slip") > 2
-    # The limit of narrow widths, which is off by as much as a creep through the width.
+    # The limit of narrow widths, with an error of the size of a creep through the width.
     close = udd.Model(
         ["a1", "a2", "w1", "w2"],
         {
@@ -274,7 +274,7 @@ def test_motors_that_let_joints_go() -> None:
 
 
 def test_a_surface_that_an_input_moves_is_not_slid_on() -> None:
-    """What a driven belt does has no rate of its own here; the run says that it switches without end."""
+    """A driven belt has no rate here; the run reports that it switches without end."""
     belt = udd.Model(["x", "v"], ["v", "-x - 3*sign(v - u)"], inputs=["u"])
     t = np.linspace(0, 1, 11)
     run = udd.simulate(belt, t, [0.0, 0.5], inputs={"u": 0.1 * np.sin(t)})

@@ -1,4 +1,4 @@
-"""What every quantity that can be swept must keep to; a new one is asked the same without another line."""
+"""Rules for every quantity that can be swept; a new quantity is tested without another line."""
 
 from __future__ import annotations
 

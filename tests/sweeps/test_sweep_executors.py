@@ -41,7 +41,7 @@ Whole = Callable[[udd.SweepSpec], tuple[Any, dict[str, bytes]]]
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
-    """What an undisturbed sweep gives, and the files of its store: each once for all tests."""
+    """The result of an undisturbed sweep, and the files of its store, computed once for all tests."""
     known: dict[str, tuple[Any, dict[str, bytes]]] = {}
 
     def get(spec: udd.SweepSpec) -> tuple[Any, dict[str, bytes]]:

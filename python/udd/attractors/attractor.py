@@ -63,11 +63,11 @@ class Attractor:
         return float(np.quantile(distance[:, 1], _QUANTILE))
 
     def holds(self, points: Floats, tight: Tightness) -> NDArray[np.bool_]:
-        """Whether records (..., k, m) of the same kind are of this attractor.
+        """Return True for the records (..., k, m) of the same kind that lie on this attractor.
 
-        Points of a periodic orbit must be near its own. Of an aperiodic motion most must lie within the set
-        as the set's own points do, and be spread over all of it: attractors that differ have no point in
-        common, but a transient may pass over an attractor.
+        Points of a periodic orbit must be near those of the attractor. Most points of an aperiodic motion
+        must lie as near to the set as its points do to each other, and must be spread over all of it.
+        Different attractors have no point in common, but a transient may pass over an attractor.
         """
         distance, nearest = self.tree.query(points)
         if self.kind != "aperiodic":
@@ -80,9 +80,9 @@ class Attractor:
 
 
 def alike(one: Attractor, other: Attractor, tight: Tightness) -> bool:
-    """Whether two records are of one attractor."""
+    """Return True if two records lie on the same attractor."""
     if one.kind != other.kind and "aperiodic" in (one.kind, other.kind):
-        # Chaos in bands too narrow to be told from points.
+        # Chaos in bands so narrow that they look like points.
         periodic, bands = (other, one) if one.kind == "aperiodic" else (one, other)
         return bool(periodic.holds(bands.points, tight))
     return bool(one.holds(other.points, tight) and other.holds(one.points, tight))

@@ -29,7 +29,7 @@ def basin_fractions(ends: NDArray[np.int32], count: int) -> tuple[Floats, Floats
 
     Notes
     -----
-    Every point stands for its cell of the grid, as in stratified sampling with one point in each stratum. The
+    Every point represents its cell of the grid, as in stratified sampling with one point in each stratum. The
     variance is that between neighbours (strata collapsed two by two along each axis): where neighbours have
     nothing in common it is the binomial one; where the basins are large only the cells at their edges count.
     """
@@ -45,7 +45,7 @@ def basin_fractions(ends: NDArray[np.int32], count: int) -> tuple[Floats, Floats
         here = (groups == k).sum(axis=1)
         share[k] = here.sum() / total
         with np.errstate(divide="ignore", invalid="ignore"):
-            # n/(n - 1) sum (x - mean)^2 of zeros and ones; a cell alone is taken for any other.
+            # n/(n - 1) sum (x - mean)^2 of zeros and ones; a single cell counts as a typical one.
             alone = share[k] * (1 - share[k])
             within = np.where(size > 1, size / (size - 1) * here * (1 - here / size), alone)
         error[k] = np.sqrt(within[size > 0].sum()) / total
@@ -63,7 +63,7 @@ def _groups(ends: NDArray[np.int32]) -> NDArray[np.int32]:
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyExponent:
-    """How the share of pairs that end differently grows with their distance.
+    """Growth of the share of pairs that end differently with their distance.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class UncertaintyExponent:
     fraction : ndarray (k,)
         The share of pairs (along the axes) whose ends differ.
     exponent, standard_error : float
-        Of fraction ~ stride^exponent, NaN where it cannot be told.
+        Of fraction ~ stride^exponent, NaN if it cannot be determined.
     fitted : ndarray of bool (k,)
         Which distances the exponent is from.
     """

@@ -72,7 +72,7 @@ def bifurcation(
     t_max: float | None = None,
     **options: Unpack[DiagramOptions],
 ) -> xr.Dataset:
-    """Section points over a parameter, with the attractors told apart.
+    """Compute section points over a parameter, with each attractor labelled.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def bifurcation(
 
         - the components of the state at the section, NaN where there are fewer points;
         - ``outcome``: how each job ended;
-        - ``kind``: ``flag_meanings`` names what each number stands for: equilibrium, rotating state, cycle,
+        - ``kind``: ``flag_meanings`` names each number: equilibrium, rotating state, cycle,
           torus, chaos; aperiodic where the exponents leave that open; left; none without a verdict;
         - ``period``: the number of distinct points (the rounds of a cycle, 1 at rest), 0 not periodic, -1
           without a verdict;
@@ -149,8 +149,8 @@ def bifurcation(
 
     Notes
     -----
-    What is not periodic is told by the exponents of a short run on. A chaotic transient that outlives the
-    run looks like chaos; where the ways up and down differ, all are followed to the length of
+    The exponents of a short further run classify what is not periodic. A chaotic transient that outlives the
+    run looks like chaos. If the ways up and down differ, all are followed to the length of
     `max_extension` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the
     way up or down begins at its initial state again with the next value.
 

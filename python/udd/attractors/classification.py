@@ -82,7 +82,7 @@ class MotionClassifier:
         return self.model if self.parameter is None else self.model.with_parameters({self.parameter: value})
 
     def attractor(self, found: Crossings, verdicts: Classification, job: int) -> Attractor:
-        """What a job with a verdict ended on."""
+        """Return the attractor on which a job with a verdict ended."""
         period = int(verdicts.period[job])
         if verdicts.rest[job]:
             last = found.points[job, -1]
@@ -149,7 +149,7 @@ def follow(
 ) -> tuple[Crossings, Classification]:
     """Run jobs, and those that still settle for twice as long, again and again, up to `longest` points.
 
-    What is not clear then has the outcome "undecided".
+    A job that is still not clear has the outcome "undecided".
     """
     found = runner(rows, starts, transient, n)
     verdicts = judge(found, values)

@@ -1,4 +1,4 @@
-"""What stands beside the arrays of a result."""
+"""Attributes of the arrays of a result: names, units and options."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def of_parameter(model: Model, name: str) -> dict[str, Any]:
 
 
 def time_unit(model: Model) -> str:
-    """Of the model's time."""
+    """Return the unit of the model's time."""
     return "1" if all(not unit for unit in model.state_units) else "s"
 
 

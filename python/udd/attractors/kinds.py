@@ -1,4 +1,4 @@
-"""What kind of motion each attractor of a diagram is."""
+"""The kind of motion on each attractor of a diagram."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def kinds_of(
     rows: Floats,
     values: Floats,
 ) -> NDArray[np.int8]:
-    """The place in `MOTIONS` of each job.
+    """Return the place in `MOTIONS` of each job.
 
-    What does not come back is chaos if neighbouring orbits part, a torus if two directions neither grow nor
-    shrink, a cycle (of more rounds than can be counted) if one does.
+    A motion that does not come back is chaos if neighbouring orbits diverge, a torus if two directions
+    neither grow nor shrink, and a cycle (of more rounds than can be counted) if one direction does.
     """
     kind = np.zeros(len(values), dtype=np.int8)
     known = decided(found, verdicts)

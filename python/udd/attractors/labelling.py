@@ -17,7 +17,7 @@ from .section_runs import Crossings
 
 @dataclass(frozen=True, eq=False)
 class DiagramLabels:
-    """What is known of each job and of each value.
+    """Labels of the jobs and of the parameter's values.
 
     Attributes
     ----------

@@ -54,7 +54,7 @@ def sized_by_motion(
             span = float(found.t[job, -1] - found.t[job, -1 - min(_RETURNS, n - 1)])
             range_ = np.maximum(range_, _range(runner, found.points[job, -1], span))
         else:
-            # What rests is moved by errors alone.
+            # An equilibrium is moved by errors alone.
             way = np.maximum(way, _range(runner, starts[some[job]], float(found.t_end[job])))
     between = np.ptp(starts, axis=0)
     noise = 100.0 * (runner.atol + runner.rtol * np.abs(starts).max(axis=0))

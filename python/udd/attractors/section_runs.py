@@ -44,7 +44,7 @@ class Crossings:
 
 @dataclass(frozen=True)
 class SectionRunner:
-    """What all jobs of an analysis have in common."""
+    """The settings that all jobs of an analysis have in common."""
 
     model: Model
     section: tuple[str, ...]

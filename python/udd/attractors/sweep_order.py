@@ -15,7 +15,7 @@ from .section_runs import INTERRUPTED, UNDECIDED, Crossings, parts
 
 PATHS = {"independent": ("independent",), "up": ("up",), "down": ("down",), "both": ("up", "down")}
 
-# Of no particular direction, so that it does not stay within a symmetry.
+# In no particular direction, so that it breaks every symmetry.
 _KICK = np.array([1.0, -0.7, 0.4, -0.2, 0.1])
 _GOES_ON = [OUTCOMES.index("finished"), OUTCOMES.index("time ran out"), UNDECIDED]
 
@@ -33,7 +33,7 @@ def nothing(jobs: int, n: int, dim: int) -> Crossings:
 
 
 def perturbation(size: Floats, nudge: float) -> Floats:
-    """What is added to a state that is carried over; `size` is that of the components."""
+    """Return the perturbation of a state that is carried over; `size` is that of the components."""
     result: Floats = nudge * np.where(np.isfinite(size), size, 0.0) * np.resize(_KICK, len(size))
     return result
 
@@ -59,13 +59,13 @@ def run_in_order(
     places : ndarray (paths, starts, values)
         The number of each job.
     names : tuple of str
-        Of the paths.
+        The names of the paths.
     added : ndarray (dim,)
-        To a state that is carried over.
+        The perturbation of a state that is carried over.
     each : int
         Section points of a job.
     tell : callable
-        Is told how many more are done.
+        Called with the number of jobs that were done since the last call.
     """
     steps = _at_once(begin, places, each) if names == ("independent",) else None
     states = np.tile(begin, (len(names), 1))

@@ -120,7 +120,7 @@ def _of_family(curve: FamilyCurve, place: CurvePoint, found: Multipliers) -> Tes
 
 
 def _discriminant(values: np.ndarray) -> float:
-    """Of the polynomial whose roots are the ``value + 1/value`` of two pairs, scaled.
+    """Return the scaled discriminant of the polynomial with the roots ``value + 1/value`` of two pairs.
 
     A simple zero where they meet, however near to each other the values themselves are there.
     """

@@ -240,10 +240,11 @@ def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> Floats:
 def location_error(
     curve: AnyCurve, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
 ) -> tuple[float, float]:
-    """Bounds of the errors of the value and of the period at a zero of the test function `name`.
+    """Return bounds of the errors of the value and of the period at a zero of the test function `name`.
 
-    Of cycles: how far they move when runs are less accurate. Of equilibria: what the rounding of the test
-    function, seen in its values near by, makes of its zero; the period is that of the cycles born there.
+    The bound of a cycle is how far both move when runs are less accurate. The bound of an equilibrium comes
+    from the rounding of the test function, measured near its zero; the period is that of the cycles born
+    there.
     """
     if isinstance(curve, EquilibriumCurve):
         return _scatter(curve, a, sigma, place, step, name)
@@ -293,7 +294,7 @@ def _scatter(
 
 
 def frequency_of(curve: AnyCurve, u: Floats, signs: TestFunctions) -> float:
-    """Of the pair that bifurcates there, per unit of time."""
+    """Return the frequency of the pair that bifurcates there, per unit of time."""
     if isinstance(curve, PeriodicOrbitCurve):
         return float(np.angle(signs.pair)) / curve.span(u)
     return signs.pair.imag

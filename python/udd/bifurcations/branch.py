@@ -92,7 +92,7 @@ class BifurcationPoint(Drawable):
 
     @property
     def criticality(self) -> str:
-        """Of a Hopf bifurcation: "supercritical" (cycles are born stable) or "subcritical"; else empty."""
+        """Whether a Hopf point is "supercritical" (cycles are born stable) or "subcritical"; else empty."""
         if np.isnan(self.lyapunov_coefficient):
             return ""
         return "supercritical" if self.lyapunov_coefficient < 0 else "subcritical"

@@ -45,7 +45,7 @@ def continuation(
     until: str | Callable[[BifurcationPoint], bool] | None = None,
     amplitude: float = 0.01,
 ) -> Branch:
-    """Follow an equilibrium or a cycle over a parameter, through folds, and tell where it bifurcates.
+    """Follow an equilibrium or a cycle over a parameter, through folds, and locate its bifurcations.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def continuation(
         point the branch that is born there is followed (of a Hopf bifurcation the cycles, of a period
         doubling those of twice the period, ...), away from it.
     parameter : str, optional
-        One of ``model.parameters``; by default that of the bifurcation point. Of cycles of a conservative
-        model also ``"period"``, or the formula of a conserved quantity such as ``"v^2/2 - cos(x)"``: cycles
-        come in families over it while all parameters stay.
+        One of ``model.parameters``; by default that of the bifurcation point. Cycles of a conservative model
+        come in families while all parameters stay. These are followed over ``"period"``, or over the formula
+        of a conserved quantity such as ``"v^2/2 - cos(x)"``.
     bounds : (float, float)
         The branch ends where the parameter leaves them.
     direction : {"both", "up", "down"}
@@ -70,8 +70,8 @@ def continuation(
         A branch of cycles ends where the period exceeds this, by default 40 typical times, or 8
         times that of the start.
     until : str or callable, optional
-        A kind of bifurcation whose first point ends the branch, or what tells it of a
-        :class:`BifurcationPoint`.
+        A kind of bifurcation whose first point ends the branch, or a function that returns True for the
+        :class:`BifurcationPoint` that ends it.
     amplitude : float
         How far from a bifurcation point its new branch is looked for first. It is halved, and the first step
         with it, until the branch does as the normal form of the bifurcation says.
@@ -88,14 +88,15 @@ def continuation(
     Notes
     -----
     The curve is followed by its arclength (H. B. Keller, 1977): a step along the tangent, then Newton's
-    method in the plane across it. Folds, and zeros of ``det(M - 1)``, ``det(M + 1)`` and the products of
-    pairs of multipliers less 1 (of equilibria: eigenvalues and their sums), are located by Brent's method
-    along the arclength, each value from an orbit corrected anew. A symmetric cycle is followed over half its
-    period, where losing the symmetry is a multiplier -1. Multipliers come from a periodic Schur decomposition
-    of the pieces' derivatives, so that weak ones are right beside strong ones; where rounding leaves their
-    sign open, or their product is not that of Liouville's formula, no bifurcation is told. Where an
-    equilibrium meets a surface on which the law has a kink (a border collision), the branch lands on it, from
-    whichever side, and goes on with the other law's tangent.
+    method in the plane across it. Brent's method locates folds, and zeros of ``det(M - 1)``, ``det(M + 1)``
+    and the products of pairs of multipliers less 1 (for equilibria: eigenvalues and their sums). Each value
+    comes from a newly corrected orbit. A symmetric cycle is followed over half its period; it loses the
+    symmetry at a multiplier -1.
+
+    Multipliers come from a periodic Schur decomposition of the pieces' derivatives, so that weak ones are
+    accurate next to strong ones. No bifurcation is reported if rounding leaves their sign open, or if their
+    product contradicts Liouville's formula. If an equilibrium meets a surface on which the law has a kink (a
+    border collision), the branch lands on the surface and goes on with the other law's tangent.
 
     Examples
     --------

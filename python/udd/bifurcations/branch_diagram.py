@@ -167,7 +167,8 @@ def descendants(
 ) -> list[Branch]:
     """These branches, and those born at their points and at the points of those; of mirror images one.
 
-    `begun` is told whose branch is followed next, `missed` whose is not found, which leaves the others.
+    `begun` is called with each point whose branch is followed next, `missed` with each point whose branch is
+    not found; the others are followed nevertheless.
     `options` are those of :func:`udd.continuation`.
     """
     found = list(branches)

@@ -1,4 +1,4 @@
-"""What a branch of cycles ends in: a Hopf point, the branch from which it bifurcates, or its start."""
+"""Ends of branches of cycles: a Hopf point, the branch from which they bifurcate, or their start."""
 
 from __future__ import annotations
 

@@ -49,8 +49,8 @@ CLOSED = "the branch is closed"
 class ContinuationLimits:
     """How far a branch is followed.
 
-    `step` and `longest` are arclengths in scaled unknowns; `until` tells of a bifurcation point whether it
-    is the last that is wanted.
+    `step` and `longest` are arclengths in scaled unknowns; `until` returns True for the bifurcation point
+    that ends the branch.
     """
 
     low: float
@@ -64,7 +64,7 @@ class ContinuationLimits:
 
 @dataclass
 class BranchTrace:
-    """What was met on the way: points of the branch with their arclength, bifurcations, why it ends."""
+    """One direction of a branch: points with their arclength, bifurcations, and why it ends."""
 
     places: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]]
     points: list[BifurcationPoint]

@@ -21,7 +21,7 @@ from .shooting_curve import PeriodicOrbitCurve
 __all__ = ["born_at", "doubled"]
 
 _HALVINGS = 24
-_BENT = 1.5  # by so much the ratio of two distances, at an amplitude and at half of it, may differ from 4
+_BENT = 1.5  # largest difference from 4 of the ratio of two distances, at an amplitude and at half of it
 _ROUNDING = 1e-6  # a test function that is smaller has no sign
 _STILL = 1e-9  # a parameter that moves less does not move, as where a conservative cycle is born
 
@@ -88,7 +88,7 @@ def _nothing_between(
     It `begins` at this value of the parameter.
     """
     before, after = test_functions_at(curve, half), test_functions_at(curve, whole)
-    # What vanishes all along, as where energy is kept, changes its sign by rounding.
+    # A function that vanishes all along, as with a conserved energy, changes its sign by rounding.
     clear = [max(abs(getattr(s, name)) for s in (before, after)) for name in changes(before, after)]
     if any(size > _ROUNDING for size in clear):
         return False
@@ -122,7 +122,7 @@ def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbit
     base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
     new.fix_phase(base)
     if isinstance(new, FamilyCurve) and isinstance(curve, FamilyCurve):
-        # Two rounds have the multiplier 1 twice here: one round tells what is kept from what bifurcates.
+        # Two rounds have the multiplier 1 twice here: one round separates conservation from bifurcation.
         new.free = curve.slope(u)
     row = new.pack(away, 0.0, 0.0)
     return new, base, row / np.linalg.norm(row)

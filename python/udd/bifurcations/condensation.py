@@ -61,7 +61,7 @@ class CyclicEquations:
             The equations are singular.
         """
         m, r, _ = self.pieces.shape
-        # Of each piece: begin x[i] + end x[i + 1] + rest (p, q, -1) = 0.
+        # Each piece says: begin x[i] + end x[i + 1] + rest (p, q, -1) = 0.
         begin, end = self.pieces, np.broadcast_to(-self.after * np.eye(r), (m, r, r))
         rest = np.concatenate([self.both, right[: m * r].reshape(m, r, 1)], axis=2)
         node = np.arange(m + 1)  # where pieces begin, and where the last one ends

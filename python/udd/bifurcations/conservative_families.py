@@ -18,7 +18,7 @@ from .shooting_curve import PeriodicOrbitCurve
 __all__ = ["PERIOD", "Conserved", "FamilyCurve", "in_a_family"]
 
 PERIOD = "period"
-"""What a family is followed over where no conserved quantity is given."""
+"""The name of the parameter of a family without a given conserved quantity."""
 
 _KEPT = 1e-9  # of the sizes of its terms: a rate of change below is zero
 _PROBES = 16
@@ -104,11 +104,12 @@ def _plain(model: Model) -> dict[str, float]:
 class FamilyCurve(PeriodicOrbitCurve):
     """Scaled nodes of a cycle where something is kept, its time, and what singles it out of its family.
 
-    What is kept makes one of the equations depend on the others. So the last gap may be of any size in the
+    Conservation makes one of the equations depend on the others. So the last gap may be of any size in the
     direction in which the quantity grows: one more unknown, which is zero in every solution, since an orbit
-    comes back with what it had (the unfolding of F. J. Munoz-Almaraz et al., Physica D 181 (2003) 1). Over
-    the period this unknown stands where the time stands in other curves, and the time in the parameter's
-    place; over a conserved quantity it is how far the orbit's is from that in the parameter's place.
+    comes back with what it had (the unfolding of F. J. Munoz-Almaraz et al., Physica D 181 (2003) 1). If
+    the family is followed over the period, this unknown has the place that the time has in other curves, and
+    the time has the parameter's. Over a conserved quantity it is the difference of the orbit's quantity from
+    the parameter.
 
     Attributes
     ----------
@@ -127,7 +128,7 @@ class FamilyCurve(PeriodicOrbitCurve):
 
     @property
     def name(self) -> str:
-        """What the family is followed over."""
+        """The name of the quantity over which the family is followed."""
         return PERIOD if self.conserved is None else self.conserved.text
 
     def pack(self, nodes: Floats, span: float, value: float) -> Floats:

@@ -55,15 +55,15 @@ class Crisis(Drawable):
     ----------
     kind : {"boundary crisis", "interior crisis", "attractor merging crisis"}
         Beyond a boundary crisis the attractor is a transient, beyond an interior crisis it is suddenly
-        larger, and beyond a merging crisis one with its mirror image. Told by where the other side of the
-        cycle's unstable manifold goes, in a finite time: a verdict without a bound.
+        larger, and beyond a merging crisis one with its mirror image. The verdict depends on where the other
+        side of the cycle's unstable manifold goes in a finite time; it has no bound.
     parameter : str
     value : float
         The parameter's value.
     error : float
         A bound of the tangency's error: how far it moved with the last round about the cycle, how far it
         moves when runs are a hundred times less accurate, and when the manifold begins ten times further from
-        the cycle. Of an earlier tangency that the `returns` do not show there is no bound.
+        the cycle. It does not cover an earlier tangency that the `returns` do not show.
     side : {"below", "above"}
         Where the attractor is the smaller one: of the value.
     returns : int
@@ -214,7 +214,7 @@ def _saddle_of(curve: PeriodicOrbitCurve, u: Floats) -> _Saddle | None:
     """The cycle, if one multiplier is above 1 and all others are inside the unit circle."""
     flow, values = curve.flow, curve.values_at(u)
     closing = curve.monodromy(u)
-    # Of a symmetric cycle over the whole period: in the mirror the sides may change.
+    # A symmetric cycle is taken over the whole period: in the mirror the sides may change.
     around = flow.scaled(closing @ closing if curve.symmetric else closing)
     numbers, right = np.linalg.eig(around)
     across = np.abs(numbers - 1.0) > 1e-6
@@ -477,7 +477,7 @@ class _Search:
         return heights
 
     def _kind(self, saddle: _Saddle) -> str:
-        """What becomes of the attractor: where the other side of the manifold goes."""
+        """Return what becomes of the attractor, by where the other side of the manifold goes."""
         flow, u = self.flow, (np.arange(_OTHERS) + 0.5) / _OTHERS
         leaves = np.log(1.0 / self.away) / np.log(saddle.multiplier) * saddle.period
         age = _AGE * flow.clock
@@ -490,7 +490,7 @@ class _Search:
             image = self._crossings(saddle, flow.mirror * outer, time)
             if (_staying(*image, attractor, flow.size) < np.inf).mean() > _MOST:
                 return "attractor merging crisis"
-        # What leads to the attractor, if slowly, is a chaotic transient that becomes a part of it.
+        # A chaotic transient that leads to the attractor, if slowly, becomes a part of it.
         early, all_ = (comes < leaves + age).mean(), (comes < np.inf).mean()
         return "interior crisis" if all_ > _MOST or all_ > early + _SOME else "boundary crisis"
 

@@ -25,7 +25,7 @@ _ROUNDS = 40.0  # periods of the Hopf bifurcation, up to which its cycles are fo
 
 
 def fold_of_cycles_at(point: LocusPoint, bounds: Sequence[float]) -> BifurcationPoint:
-    """The fold of the cycles near a Bautin point, at a value of the second parameter beside it.
+    """Return the fold of the cycles near a Bautin point, at a nearby value of the second parameter.
 
     Raises
     ------

@@ -30,7 +30,7 @@ _ROUNDS = 4  # expansions of the law
 def degenerate_root(law: Law, x: Floats, nearest: bool) -> tuple[Floats, bool] | None:
     """The degenerate root near a point, and whether it is isolated; None if there is none.
 
-    Of a set of roots the point near `x`, or the one that is `nearest` to the origin.
+    If roots form a set, it is the point near `x`, or the one that is `nearest` to the origin.
     """
     begin = x
     snapped = np.where(np.abs(x) < _SNAPPED * (1.0 + np.abs(x).max()), 0.0, x)

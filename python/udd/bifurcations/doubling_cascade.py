@@ -23,9 +23,7 @@ from .solutions import PeriodicOrbit
 __all__ = ["Cascade", "cascade"]
 
 _KIND = "period doubling"
-_CLOSER = (
-    2.5  # by about so much the doubled orbits differ less from one doubling to the next (Feigenbaum's alpha)
-)
+_CLOSER = 2.5  # about the factor by which the two rounds come closer at each doubling (Feigenbaum's alpha)
 _KNOWN = 3  # doublings, whose spacings say where the next one is
 
 

@@ -76,7 +76,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     -----
     If the rates are polynomials, or quotients of polynomials, a homotopy follows as many paths as the
     product of their degrees, the Bezout number, which end in all isolated equilibria (up to 600 paths). A
-    multiple root is refined by deflation. Of a curve or surface of equilibria the list has a point or two:
+    multiple root is refined by deflation. A curve or surface of equilibria is represented by a point or two:
     those at the states given as `near`, and those nearest to the origin.
 
     For other laws each start is refined by Powell's hybrid method with exact derivatives
@@ -285,7 +285,7 @@ def _apart(flow: FlowMap, a: Floats, b: Floats) -> bool:
 
 
 def equilibrium_at(flow: FlowMap, values: Floats, x: Floats) -> Equilibrium:
-    """What there is to say of an equilibrium."""
+    """Return the equilibrium at a state with its eigenvalues, kind and Lyapunov coefficient."""
     here = expansion(flow, values, x, higher=True)
     eigenvalues = np.linalg.eigvals(here.by_state).astype(complex)
     eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
@@ -336,7 +336,7 @@ def _rest_from(
         matrix = slopes(found.x)
         regular = bool(np.linalg.cond(matrix) < 1e12)
         if regular:
-            # Beside a multiple root rates are small too.
+            # Near a multiple root rates are small too.
             regular = _margin(flow, values, found.x, matrix) > _EXACT * max(1.0, np.abs(found.x).max())
     return found.x * flow.size, regular
 

@@ -14,7 +14,7 @@ from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, natural_constraint, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
 
-COARSE = 100.0  # by this factor runs are less accurate where the error is told
+COARSE = 100.0  # factor by which the runs that measure the error are less accurate
 
 
 def rounding_of(value: Any) -> Any:
@@ -25,7 +25,7 @@ def rounding_of(value: Any) -> Any:
 def period_error_of(curve: PeriodicOrbitCurve, u: Floats) -> float:
     """A bound of the error of a cycle's period: how far it moves when runs are less accurate.
 
-    One of a family has none, unless its period or energy is held: less accurate runs find another.
+    A member of a family has no bound unless its period or energy is fixed: less accurate runs find another.
     """
     if in_a_family(curve, u):
         return float("nan")

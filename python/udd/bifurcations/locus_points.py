@@ -107,7 +107,7 @@ class Segment:
         if part == 0.0:
             return self.begin
         guess = self.begin.v + part * (self.end.v - self.begin.v)
-        # Where the surface is bent the guess lies off it by the square of the step.
+        # If the surface is curved, the guess misses it by the square of the step.
         return self.surface.zero(self.begin, guess, self.normal, self.name, self.length)
 
 

@@ -60,7 +60,7 @@ def _approached(
             return None  # the branch has turned away
         distance = -value / slope
         if distance < _LAST:
-            # What is left of the curve is straight to rounding.
+            # The remaining piece of the curve is straight to rounding.
             return CurvePoint(place.u + distance * place.tangent, place.tangent)
         guess = place.u + part * min(distance, step) * place.tangent
         try:
@@ -78,7 +78,7 @@ def _other_tangent(curve: EquilibriumCurve, place: CurvePoint, j: int, side: flo
     """The tangent that leaves a corner to the other side of surface `j`."""
     beyond = place.u + _BEYOND * place.tangent
     _, matrix = curve.equations(beyond)
-    # What the equations of the other side leave free.
+    # The direction that the equations of the other side leave free.
     tangent: Floats = np.linalg.svd(matrix)[2][-1]
     change = float(curve.at(place.u + _BEYOND * tangent).surfaces[j] - curve.at(place.u).surfaces[j])
     return tangent if change * side < 0.0 else -tangent

@@ -1,4 +1,4 @@
-"""What cycles look like between their nodes."""
+"""Shapes of cycles between their nodes: states, extremes and crossings."""
 
 from __future__ import annotations
 

@@ -46,8 +46,8 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
 
     Notes
     -----
-    By the normal form, parameter and multiplier are nearly linear in the square of the amplitude: the bend of
-    the parameter says where the next doubling is expected, the secant method finds the multiplier -1.
+    By the normal form, parameter and multiplier are nearly linear in the square of the amplitude. The bend of
+    the parameter says where the next doubling is expected, and the secant method finds the multiplier -1.
     """
     curve, start = point._curve, point._place
     if not isinstance(curve, PeriodicOrbitCurve) or start is None:
@@ -59,7 +59,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         """The orbit at the square of an amplitude, from another one."""
         before = float(row @ (near - base))
         bent = near - base - before * row
-        # What is across the amplitude grows with its square.
+        # The part across the amplitude grows with its square.
         guess = base + square**0.5 * row + bent * (square / before**2 if before else 0.0)
         try:
             u = newton_corrector(new, guess, row)
@@ -100,7 +100,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
     )
     own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
-    # What the secant method passed beyond the doubling is left out.
+    # Orbits beyond the doubling, from the secant method, are left out.
     places: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]] = [
         (new, *found[s], s**0.5) for s in sorted(found) if s <= square
     ]

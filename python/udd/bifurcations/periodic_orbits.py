@@ -36,7 +36,7 @@ __all__ = ["closed", "cycle_at", "flown", "half_of", "periodic_orbit", "pieces_f
 _FINE = 64  # states looked at in a typical time
 _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
 _SAME = 1e-7  # two states within this part of the sizes are one
-_HALF = 3e-2  # at a bifurcation, told by how the parameter turns, halves agree as well as the point is known
+_HALF = 3e-2  # sizes by which the halves differ at most, at a bifurcation where the parameter turns
 _PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
 _LOOKS = 100  # states that show the extent of a cycle
 _WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
@@ -69,13 +69,13 @@ def periodic_orbit(
         value of the parameter are taken. By default the search starts where :func:`udd.lyapunov` does.
     period : float or str, optional
         About its period. By default the run from the guess tells it: the first time that it comes back, or
-        nearly back, be it to the mirror image. Of a forced model exactly the forcing's period, or a multiple
-        of it: a number, or a formula of the parameters such as ``"2*pi/w"``, by which it also changes along a
-        branch.
+        nearly back, be it to the mirror image. A forced model needs exactly the forcing's period, or a
+        multiple of it: a number, or a formula of the parameters such as ``"2*pi/w"``, by which it also
+        changes along a branch.
     settle : float, optional
         For so long the model is run from the guess before, to get near a stable cycle; by default 0, or 600
-        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess. Of a forced model:
-        for as many whole periods as this takes; the guess is a state at time 0.
+        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess. For a
+        forced model this time is rounded up to whole periods; the guess is a state at time 0.
     max_period : float, optional
         The longest period looked for, by default 40 typical times.
 
@@ -197,7 +197,7 @@ def closed(
     flow: FlowMap, nodes: Floats, span: float, mirror: Floats, shift: Floats
 ) -> tuple[PeriodicOrbitCurve, Floats]:
     """The curve at whose present parameters the orbit closes, and the unknowns there."""
-    # The parameter is held: any that does not vanish will do, and none where the model has none.
+    # The parameter is fixed: any that does not vanish will do; a model may have none.
     held = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
     value = 0.0 if held == HELD else float(flow.values[held])
     scale = abs(value) or 1.0
@@ -260,7 +260,7 @@ def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve,
     """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
     flow, values = curve.flow, curve.values_at(u)
     span, start = curve.span(u), curve.nodes(u)[0]
-    # What is symmetric closes after odd parts only, seen in the mirror.
+    # A symmetric cycle closes in the mirror after odd parts only.
     ways = [(k, curve.mirror) for k in _PRIMES if k > 2 or not curve.symmetric]
     if flow.mirror is not None and not curve.symmetric:
         ways.append((2, flow.mirror))

@@ -260,7 +260,7 @@ def _fraction(
 def _combined(
     name: str, taken: list[tuple[_Terms, _Terms]], number: float, one: _Terms
 ) -> tuple[_Terms, _Terms] | None:
-    """What an operation makes of fractions."""
+    """Apply an operation to fractions."""
     if name == "^":
         power = number
         if len(taken) == 2:
@@ -296,7 +296,7 @@ def _plus(a: _Terms, b: _Terms) -> _Terms:
     for e, (value, size) in b.items():
         before = result.get(e, (0.0, 0.0))
         result[e] = before[0] + value, before[1] + size
-    # What cancels but for rounding is zero.
+    # Terms that cancel but for rounding are zero.
     return {e: (value, size) for e, (value, size) in result.items() if abs(value) > 8.0 * _EPS * size}
 
 

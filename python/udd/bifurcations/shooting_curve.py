@@ -29,9 +29,9 @@ def _planes(rates: Floats) -> Floats:
 class PeriodicOrbitCurve:
     """Scaled nodes of an orbit that closes after the time `span`, and that time, and the parameter.
 
-    The orbit is cut into pieces of equal time. What comes out of the last one, seen in the mirror where
-    `mirror` has signs and turned by `shift`, must be where the first one starts: a symmetric cycle is
-    followed over half its period. The phase is fixed by an integral condition: all nodes together do not move
+    The orbit is cut into pieces of equal time. The end of the last one, reflected by the signs of `mirror`
+    and turned by `shift`, must be the start of the first one. So a symmetric cycle is followed over half its
+    period. The phase is fixed by an integral condition: all nodes together do not move
     along the flow of a reference orbit. That of a forced model is fixed by the time, and instead the orbit
     lasts as long as the forcing says.
 
@@ -171,7 +171,7 @@ class PeriodicOrbitCurve:
             phase, along = float((self.across * (nodes - self.reference)).sum()), self.across * size / weight
             last = np.zeros(2)
         else:
-            # A later piece also begins later, by as much as those before it take longer.
+            # A piece also begins later if the pieces before it take longer.
             rates = self._rates_at_nodes(u)
             moved = found.rate - np.einsum("mij,mj->mi", found.by_state, rates)
             by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
@@ -220,7 +220,7 @@ class PeriodicOrbitCurve:
         """The pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
 
         Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
-        Of a forced model's all are those of the stroboscopic map: the whole derivatives (m, r, r).
+        A forced model keeps the whole derivatives (m, r, r), with all multipliers of the stroboscopic map.
         """
         size, found = self.flow.size, self.flight(u)
         turn = np.ones((self.pieces, self.flow.dim))

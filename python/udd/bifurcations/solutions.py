@@ -31,7 +31,7 @@ _ON = 1e-7  # from the unit circle: a double multiplier 1 is known to the square
 
 
 class FoundList(list[Found]):
-    """What a search found.
+    """The results of a search.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class FoundList(list[Found]):
 
 
 def kind_of_rest(eigenvalues: Complex) -> str:
-    """What the flow near an equilibrium with these eigenvalues looks like."""
+    """Return the name of the flow near an equilibrium with these eigenvalues."""
     growing, turning = eigenvalues.real > 0, np.abs(eigenvalues.imag) > 0
     if (eigenvalues.real == 0.0).all() and turning.all():
         return "centre"
@@ -115,8 +115,8 @@ class PeriodicOrbit(Drawable):
     period : float
         Its period, the time after which all that the rates depend on is as before.
     multipliers : ndarray of complex, shape (r - 1,)
-        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out. Of a
-        forced model: those of the stroboscopic map, shape (r,).
+        The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out. A
+        forced model has those of the stroboscopic map, shape (r,).
     symmetric : bool
         Whether it is its own image under the model's symmetry, half a period later.
     nodes : ndarray, shape (m, dim)
@@ -163,7 +163,7 @@ class PeriodicOrbit(Drawable):
     def period_error(self) -> float:
         """A bound of the period's error: how far it moves when runs are a hundred times less accurate.
 
-        NaN of a cycle that is one of a family, unless its period or energy is held.
+        NaN of a cycle that is one of a family, unless its period or energy is fixed.
         """
         from .error_bounds import period_error_of
 

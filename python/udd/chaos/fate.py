@@ -1,4 +1,4 @@
-"""What an orbit ends on: rest, a cycle, infinity, or a motion that does not come back."""
+"""The end of an orbit: rest, a cycle, infinity, or a motion that does not come back."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _FAR = 1e12  # times its first size: a motion that grew so far is unbounded
 
 @dataclass(frozen=True)
 class Fate:
-    """What an orbit is on: a verdict, "settling" or "aperiodic".
+    """The motion on which an orbit is: a verdict, "settling" or "aperiodic".
 
     From `state` on, after the time `t`, if it is ordered. `clock` is the mean time between section points,
     NaN where there are none.
@@ -100,7 +100,7 @@ class Orbit:
             return self.points(start, section, **few)
 
     def fate(self, start: _Floats, longest: float = 0.0) -> Fate:
-        """What the orbit does from here on: 600 section points, and more for the time `longest`."""
+        """Return the fate of the orbit from here on: 600 section points, and more for the time `longest`."""
         rests = RestTest(
             self.model, self.kept, self._coordinates.clock, max(longest, 2e5 * self.model.time_scale),
             self.rtol, self.atol,

@@ -148,7 +148,7 @@ def lyapunov(
     Notes
     -----
     The tangent vector is the derivative part of a run over dual numbers, kept at length 1
-    (Benettin et al., Meccanica 15 (1980) 9); steps are taken by the Taylor method, many orbits at once. The
+    (Benettin et al., Meccanica 15 (1980) 9). The Taylor method advances many orbits at once. The
     exponent is that of the orbit from `state0`: a transient longer than `t`, as near w = 4.5, is not seen as
     one. See :func:`udd.lyapunov_spectrum` for a verdict. Drives are taken in portions, so that memory hardly
     grows beyond the result.
@@ -252,7 +252,7 @@ def reason(outcome: str, failure: str | None) -> str:
 
 
 def span(t: float | None, transient: float | None, *, longest: float, skip: float) -> tuple[float, float]:
-    """The checked time to run and how much of it is left out at the start."""
+    """Return the checked time of the run and the part of it that is left out at the start."""
     time = number("t", longest if t is None else t, above=0.0)
     skipped = number("transient", min(skip, 0.1 * time) if transient is None else transient, least=0.0)
     if skipped >= time:

@@ -301,8 +301,8 @@ def poincare(
 
     Notes
     -----
-    Steps are taken by a Taylor method, whose polynomials are as accurate as the steps; a crossing is a zero
-    of the expression on such a polynomial. Where the expression may have several zeros, interval arithmetic
+    The Taylor method's polynomials are as accurate as its steps; a crossing is a zero of the expression on
+    such a polynomial. Where the expression may have several zeros, interval arithmetic
     divides the step until each part has at most one, however fast the expression changes. A surface that is
     only touched is not crossed. A smooth pulse of the law that is shorter than a step may need ``max_step``.
 
@@ -436,7 +436,7 @@ def _hint(section: Section) -> str:
 
 
 def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Section, partial: bool) -> None:
-    """Tell of orbits with fewer points."""
+    """Warn of orbits with fewer points."""
     short = outcome != OUTCOMES.index("finished")
     if not short.any():
         return

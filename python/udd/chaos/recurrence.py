@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from udd.models.state_scaling import Floats
 
 APERIODIC, SETTLING = 0, -1
-"""What stands for a period where there is none: the points do not come back; the motion still settles."""
+"""Values instead of a period: the points do not come back; the motion still settles."""
 
 _NEAR = 0.01
 _LEAST = 12
@@ -60,7 +60,7 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
     Notes
     -----
     With d the change from one period to the next, which falls by r each time, what is still to come is
-    d r/(1 - r). So a slow transient, as near a bifurcation, is not taken for its end. Periods above a
+    d r/(1 - r). So a slow transient, as near a bifurcation, is not mistaken for its end. Periods above a
     quarter of n must have settled to the last digits.
     """
     jobs, n, _ = points.shape

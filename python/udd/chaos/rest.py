@@ -133,7 +133,7 @@ class RestTest:
         states = states_along(self.model, span, _SAMPLES + 1, state, self.rtol, self.atol)
         if states is None:
             return None
-        # Of a line of equilibria it may be another.
+        # On a line of equilibria it may be another.
         end = equilibrium_near(self.model, states[-1], self.kept, 0.0)
         if end is None or end.repels != rest.repels:
             return None

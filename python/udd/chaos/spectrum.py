@@ -232,7 +232,7 @@ def lyapunov_spectrum(
         # The averages are of the way there: once more, of what it leads to.
         found, fate = run.look(fate.state, time, 0.0, goal)
         if fate.kind == "settling" and _positive(found, time_scale):
-            # Neighbours part all the way: chaos in bands too narrow to be told from points.
+            # Neighbours diverge all the way: chaos in bands so narrow that they look like points.
             fate = replace(fate, kind="aperiodic")
         aside = aside if fate.kind not in ("aperiodic", "escapes") else 0.0
     values, errors = found["value"][0], found["standard_error"][0]

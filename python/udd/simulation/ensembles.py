@@ -106,7 +106,7 @@ def ensemble(
     ----------
     model : Model
     t : array_like, shape (times,), or float
-        Times at which the states are wanted, increasing; the first is the initial time. A number stands for
+        Times at which the states are wanted, increasing; the first is the initial time. A number means
         the end of runs from 0, of which only the states there are wanted.
     state0 : array_like, shape (..., dim), optional
         Initial states.

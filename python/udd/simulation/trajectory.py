@@ -37,8 +37,8 @@ class Event(NamedTuple):
     ----------
     kind : str
         ``"reversal"`` (Omega = 0), ``"friction kink"`` (k reaches its floor), ``"edge"`` (the disk leaves
-        the wheels); with dry friction that is not smoothed also ``"stick"`` (it comes to rest and is held),
-        ``"slip"`` (it is let go) and ``"band"`` (the speed passes the edge of Karnopp's band).
+        the wheels); with dry friction that is not smoothed also ``"stick"`` (it stops and sticks),
+        ``"slip"`` (it starts to move) and ``"band"`` (the speed passes the edge of Karnopp's band).
     t : float
         When.
     state : ndarray, shape (dim,)
@@ -84,7 +84,7 @@ class Events:
 
 
 class Stats(NamedTuple):
-    """What the work was.
+    """Statistics of a run.
 
     Attributes
     ----------

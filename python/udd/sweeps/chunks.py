@@ -91,7 +91,7 @@ def variables_of(spec: SweepSpec) -> tuple[Variable, ...]:
 
 
 def attributes(variable: Variable) -> dict[str, object]:
-    """What is written beside an array, by the CF conventions."""
+    """Return the attributes of an array, by the CF conventions."""
     if variable.name == "outcome":
         words = " ".join(name.replace(" ", "_") for name in ("not run", *OUTCOMES))
         flags = {"flag_values": list(range(NOT_RUN, len(OUTCOMES))), "flag_meanings": words}
@@ -112,5 +112,5 @@ def spec_attributes(spec: SweepSpec) -> dict[str, object]:
 
 
 def fill_of(variable: Variable) -> float | int | bool:
-    """What stands in an array before the work is done."""
+    """Return the value of an array's entries before they are computed."""
     return {"float64": float("nan"), "int8": NOT_RUN, "bool": False}[variable.dtype]

@@ -66,7 +66,7 @@ class Memory:
         return self._done
 
     def tidy(self) -> None:
-        """There is nothing to clean up."""
+        """Do nothing: memory needs no cleaning."""
 
     def dataset(self) -> xr.Dataset:
         """What is there."""

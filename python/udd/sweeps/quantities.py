@@ -1,4 +1,4 @@
-"""What can be swept: a table from a quantity's name to the function that computes it.
+"""Quantities of sweeps: a table from a quantity's name to the function that computes it.
 
 Such a function takes the model, for each of n trajectories a row of all parameters and an initial state, the
 options, and how many threads it may use (0: one per core). It returns arrays whose first axis is the
@@ -46,7 +46,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is computed: the check of its options, its arrays (beside `outcome`), and the work."""
+    """A quantity: the check of its options, its arrays (besides `outcome`), and its function."""
 
     options: Callable[[Model, Mapping[str, Any]], Options]
     variables: Callable[[Model], tuple[Variable, ...]]
@@ -147,7 +147,7 @@ def _state_variables(model: Model) -> tuple[Variable, ...]:
 
 def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
     off = outside_domain(model, rows, states)
-    # What starts off the wheels has left them already.
+    # A disk that starts off the wheels has lost contact already.
     t_end = np.where(off, 0.0, np.nan)
     ends = np.where(off[:, None], states, np.nan)
     outcome = np.full(len(states), EJECTED, dtype=np.int8)

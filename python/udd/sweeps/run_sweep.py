@@ -45,7 +45,7 @@ def sweep(
         ``Client.get_executor()``. By default this process, chunk after chunk, on all cores.
     store : path or zarr.Group, optional
         Where the result is written, chunk by chunk as it is found; the workers must reach it. A sweep that
-        stopped goes on from there. Without one the result is held in memory.
+        stopped goes on from there. Without one the result stays in memory.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.

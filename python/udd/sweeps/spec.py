@@ -1,4 +1,4 @@
-"""What a sweep is: all that decides its numbers, as a value."""
+"""The specification of a sweep: all that decides its numbers, as a value."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _KEYS = ("quantity", "model", "over", "state0", "options", "chunk")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepSpec:
-    """What is computed, of which model, and over which values: all that decides a sweep's numbers.
+    """A quantity, a model and the values to compute it at: all that decides a sweep's numbers.
 
     Specs are equal where their hashes are.
 

@@ -126,7 +126,7 @@ class SweepStore:
                 path.unlink(missing_ok=True)
 
     def dataset(self) -> xr.Dataset:
-        """What is there, read when it is looked at."""
+        """Return the stored arrays, which are read when they are accessed."""
         import xarray as xr
 
         found: xr.Dataset = xr.open_zarr(
