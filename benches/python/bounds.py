@@ -1,13 +1,14 @@
 """Bounds of errors against values of 30 digits and more: the error over the bound, none above 1.
 
 Periods by power series in decimal arithmetic and Newton's method, Hopf points by fractions, homoclinic orbits
-of the damped equations by power series from the unstable manifold of the saddle. Points of codimension two,
-ends of branches, multipliers and coefficients by closed forms.
+by power series from the unstable manifold of the saddle. Points of codimension two, ends of branches,
+multipliers, coefficients, and homoclinic and heteroclinic orbits of two families by closed forms.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from decimal import Decimal, getcontext
 from fractions import Fraction
 from pathlib import Path
@@ -21,6 +22,8 @@ sys.path.append(str(Path(__file__).parents[2] / "tests" / "support"))
 from exact_cycles import step, symmetric_period
 
 _DIGITS, _STEP = 50, Decimal("0.1")
+_FRICTION = 0.4
+DRAG = Decimal(_FRICTION)  # as the float in the jerk equation
 
 
 def row(what: str, value: float, known: Decimal, bound: float) -> float:
@@ -144,41 +147,147 @@ def numbers_of_solutions() -> list[float]:
 
 
 def homoclinic_orbits() -> list[float]:
-    """Compare the homoclinic orbits of the saddle at z = 1/B, which end the cycles born at the Hopf point."""
+    """Compare homoclinic orbits of saddles: of the damped equations, of a jerk equation and of Lorenz's."""
     found = []
     for B in (0.15, 0.2, 0.3):
         rests = udd.equilibria(udd.DLE(2.5, B=B))
         start = next(rest for rest in rests if rest.state[0] > 1e-3)
         hopf = udd.continuation(start, "w", (0.5, 30.0)).find("Hopf")[0]
         one = udd.connection(udd.continuation(hopf, max_period=16.0))
-        known = homoclinic(Decimal(one.value), Decimal(B))
+        known = returning(one.value, *damped(Decimal(B)))
         found.append(row(f"homoclinic orbit at B = {B:g}", one.value, known, one.error))
+    texts = ["v", "a", f"-a - {_FRICTION}*v + mu*x*(1 - x)"]
+    (one,) = udd.connections(udd.Model(["x", "v", "a"], texts, {"mu": 0.7}), "mu", (0.7398, 0.7399), n=2)
+    found.append(row("homoclinic orbit of a jerk", one.value, returning(one.value, *JERK), one.error))
+    texts = ["10*(y - x)", "r*x - y - x*z", "x*y - 2*z"]
+    lorenz = udd.Model(["x", "y", "z"], texts, {"r": 12.0})
+    (one,) = udd.connections(lorenz, "r", (10.0, 16.0), n=3, t_max=2.0)
+    found.append(row("homoclinic orbit of Lorenz", one.value, returning(one.value, *LORENZ), one.error))
     return found
 
 
-def homoclinic(near: Decimal, B: Decimal) -> Decimal:
-    """Where the saddle's unstable manifold comes back to it, by secants."""
+def connections_of_closed_form() -> list[float]:
+    """Of energies H: the rate H' = y^2 (b - c + k (H - H1)) keeps H = H1, an orbit of saddles, at b = c."""
+    found = []
+    for c, k in ((0.3, -1.0), (0.7, -0.5)):
+        for kind, pull, energy, start in (
+            ("homoclinic", "x - x^2", "y^2/2 - x^2/2 + x^3/3", 1.3),
+            ("heteroclinic", "x^3 - x", "y^2/2 + x^2/2 - x^4/4 - 1/4", 0.6),
+        ):
+            planar = ["y", f"{pull} + y*(b - {c} + {k}*({energy}))"]
+            for states, texts in ((["x", "y"], planar), (["x", "y", "z"], [*planar, "x*y - 2*z"])):
+                model = udd.Model(states, texts, {"b": c + 0.1 * k})
+                orbit = udd.periodic_orbit(model, [start] + [0.0] * (len(states) - 1), settle=100.0)
+                branch = udd.continuation(orbit, "b", (0.0, 1.0), direction="up", max_period=30.0)
+                one = udd.connection(branch)
+                assert one.kind == kind
+                what = f"{kind} orbit of {len(states)} states at c = {c:g}"
+                found.append(row(what, one.value, Decimal(c), one.error))
+    return found
+
+
+# A model in decimals: a step in time, the saddle's growing direction, and its left eigenvector.
+Step = Callable[[list[Decimal], Decimal], list[Decimal]]
+Direction = Callable[[Decimal], list[Decimal]]
+Exact = tuple[Step, list[Decimal], Direction, Direction]
+
+
+def damped(B: Decimal) -> Exact:
+    """The damped equations about the saddle at z = 1/B."""
     growing = (-1 + (1 + 4 / B).sqrt()) / 2
+    rest = [Decimal(0), Decimal(0), 1 / B]
+    right, left = [Decimal(1), 1 + growing, Decimal(0)], [growing, Decimal(1), Decimal(0)]
+    return lambda x, w: step(x, w, _STEP, B), rest, lambda w: right, lambda w: left
+
+
+def series(rates: Callable[[list[list[Decimal]], int, Decimal], list[Decimal]], h: Decimal) -> Step:
+    """A step by a power series; `rates` gives the coefficients of an order from those of the states."""
+
+    def advanced(x: list[Decimal], value: Decimal) -> list[Decimal]:
+        table = [[number] for number in x]
+        for k in range(36):
+            for column, rate in zip(table, rates(table, k, value), strict=True):
+                column.append(rate / (k + 1))
+        return [sum((term * h**k for k, term in enumerate(column)), Decimal(0)) for column in table]
+
+    return advanced
+
+
+def product(a: list[Decimal], b: list[Decimal], k: int) -> Decimal:
+    """The coefficient of the order k of a product."""
+    return sum((a[i] * b[k - i] for i in range(k + 1)), Decimal(0))
+
+
+def jerk_rates(x: list[list[Decimal]], k: int, mu: Decimal) -> list[Decimal]:
+    """Coefficients of the jerk -a - 0.4 v + mu x (1 - x), with the float 0.4."""
+    force = mu * (x[0][k] - product(x[0], x[0], k))
+    return [x[1][k], x[2][k], -x[2][k] - DRAG * x[1][k] + force]
+
+
+def lorenz_rates(x: list[list[Decimal]], k: int, r: Decimal) -> list[Decimal]:
+    """Coefficients of Lorenz's equations with 10 and 2."""
+    a, b, c = x
+    return [10 * (b[k] - a[k]), r * a[k] - b[k] - product(a, c, k), product(a, b, k) - 2 * c[k]]
+
+
+def jerk_eigenvalue(mu: Decimal) -> Decimal:
+    """The growing eigenvalue of the origin, by Newton's method."""
+    number = Decimal("0.57")
+    for _ in range(8):
+        value = ((number + 1) * number + DRAG) * number - mu
+        number -= value / (3 * number**2 + 2 * number + DRAG)
+    return number
+
+
+def lorenz_eigenvalue(r: Decimal) -> Decimal:
+    """The growing eigenvalue of the origin."""
+    return (-11 + (81 + 40 * r).sqrt()) / 2
+
+
+def jerk_right(mu: Decimal) -> list[Decimal]:
+    """Its eigenvector."""
+    number = jerk_eigenvalue(mu)
+    return [Decimal(1), number, number**2]
+
+
+def jerk_left(mu: Decimal) -> list[Decimal]:
+    """Its left eigenvector."""
+    number = jerk_eigenvalue(mu)
+    return [number**2 + number + DRAG, number + 1, Decimal(1)]
+
+
+ORIGIN = [Decimal(0)] * 3
+JERK: Exact = series(jerk_rates, Decimal("0.1")), ORIGIN, jerk_right, jerk_left
+LORENZ: Exact = (
+    series(lorenz_rates, Decimal("0.02")),
+    ORIGIN,
+    lambda r: [Decimal(10), lorenz_eigenvalue(r) + 10, Decimal(0)],
+    lambda r: [r, lorenz_eigenvalue(r) + 10, Decimal(0)],
+)
+
+
+def returning(near: float, advanced: Step, rest: list[Decimal], right: Direction, left: Direction) -> Decimal:
+    """Where the saddle's unstable manifold comes back to it, by secants."""
     small = Decimal("1e-22")
 
-    def after(w: Decimal, steps: int) -> list[list[Decimal]]:
-        states = [[small, small * (1 + growing), 1 / B]]
+    def after(value: Decimal, steps: int) -> list[list[Decimal]]:
+        states = [[a + small * b for a, b in zip(rest, right(value), strict=True)]]
         for _ in range(steps):
-            states.append(step(states[-1], w, _STEP, B))
+            states.append(advanced(states[-1], value))
         return states
 
     # It comes back nearest to the saddle once it has been far away.
-    path = np.array([[float(value) for value in state] for state in after(near, 600)])
-    far = np.hypot(path[:, 0], path[:, 1])
+    path = np.array(after(Decimal(near), 1200), dtype=float) - np.array(rest, dtype=float)
+    far = np.linalg.norm(path, axis=1)
     peak = int(np.argmax(far > 0.5))
     last = peak + 1 + int(np.argmin(far[peak + 1 :]))
 
-    def beside(w: Decimal) -> Decimal:
-        """The part along the growing direction, by its left eigenvector (growing, 1)."""
-        x, y, _ = after(w, last)[-1]
-        return growing * x + y
+    def beside(value: Decimal) -> Decimal:
+        """The part along the growing direction."""
+        end = after(value, last)[-1]
+        return sum((a * (b - c) for a, b, c in zip(left(value), end, rest, strict=True)), Decimal(0))
 
-    a, b = near, near + Decimal("1e-13")
+    a, b = Decimal(near), Decimal(near) + Decimal("1e-13")
     at = beside(a), beside(b)
     for _ in range(12):
         if at[0] == at[1]:
@@ -195,6 +304,6 @@ if __name__ == "__main__":
     PI = Decimal("3.14159265358979323846264338327950288419716939937510")
     print("| what | known | error | bound | error/bound |")
     print("|---|---|---|---|---|")
-    new = [*special_points(), *ends_of_branches(), *numbers_of_solutions()]
+    new = [*special_points(), *ends_of_branches(), *numbers_of_solutions(), *connections_of_closed_form()]
     shares = [*periods(), *hopf_points(), *homoclinic_orbits(), *new]
     print(f"{len(shares)} numbers, the largest error over its bound {max(shares):.2f}")

@@ -7,6 +7,9 @@ import pytest
 from scipy import integrate
 
 import udd
+from udd.bifurcations.boundary_value import ConnectingCurve
+from udd.bifurcations.connecting_orbits import found_by
+from udd.bifurcations.flow_map import flow_of
 from udd.errors import ModelError
 
 
@@ -117,3 +120,36 @@ def test_a_jerk_equation_has_its_homoclinic_orbit_by_default() -> None:
     (one,) = udd.connections(model, "mu", (0.73985982, 0.73985983), n=2)
     # To 36 digits by a Taylor method.
     assert one.kind == "homoclinic" and abs(one.value - 0.7398598229327773) <= one.error < 1e-11
+
+
+@pytest.mark.parametrize(("c", "k"), [(0.3, -1.0), (0.7, -0.5)])
+def test_the_bounds_of_connections_hold_against_closed_forms(c: float, k: float) -> None:
+    # The rate of the energy H less that of the saddles is y^2 (b - c + k H): an orbit of saddles at b = c.
+    for kind, pull, energy, start in (
+        ("homoclinic", "x - x^2", "y^2/2 - x^2/2 + x^3/3", 1.3),
+        ("heteroclinic", "x^3 - x", "y^2/2 + x^2/2 - x^4/4 - 1/4", 0.6),
+    ):
+        model = udd.Model(["x", "y"], ["y", f"{pull} + y*(b - {c} + {k}*({energy}))"], {"b": c + 0.1 * k})
+        orbit = udd.periodic_orbit(model, [start, 0.0], settle=100.0)
+        one = udd.connection(udd.continuation(orbit, "b", (0.0, 1.0), direction="up", max_period=30.0))
+        assert one.kind == kind and abs(one.value - c) <= one.error < 1e-12
+
+
+def test_a_front_connects_two_equilibria_that_are_no_mirror_images() -> None:
+    # Nagumo's equation: u = 1/(1 + exp(t/sqrt(2))) at the speed (1 - 2 a)/sqrt(2).
+    model = udd.Model(["u", "v"], ["v", "-c*v - u*(1 - u)*(u - 0.3)"], {"c": 0.3})
+    flow, t = flow_of(model, np.array([[1.0, 0.5]])), np.linspace(-20.0, 20.0, 81)
+    u = 1.0 / (1.0 + np.exp(t / np.sqrt(2.0)))
+    nodes, rests = np.column_stack([u, -u * (1.0 - u) / np.sqrt(2.0)]), np.array([[1.0, 0.0], [0.0, 0.0]])
+    guess = ConnectingCurve.through(flow, flow.values, 0, rests, np.ones(2), nodes, 40.0)
+    one = found_by(*guess, "c")
+    assert one.kind == "heteroclinic" and abs(one.value - 0.4 / np.sqrt(2.0)) <= one.error < 1e-12
+
+
+def test_what_collapses_to_its_equilibrium_is_no_connection() -> None:
+    model = udd.Model(["x", "v"], ["v", "x - x^3 + v*(b - x^2)"], {"b": 0.5})
+    flow = flow_of(model, np.array([[1.0, 0.5]]))
+    nodes = 1e-3 * np.column_stack([np.linspace(1.0, 0.5, 9), np.linspace(1.0, -0.5, 9)])
+    guess = ConnectingCurve.through(flow, flow.values, 0, np.zeros(2), np.ones(2), nodes, 2.0)
+    with pytest.raises(ModelError, match="no connection is found"):
+        found_by(*guess, "b")

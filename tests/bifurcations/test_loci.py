@@ -9,6 +9,10 @@ from scipy import integrate
 import udd
 from tutorial_models import BAZYKIN, CO, REACTION
 from tutorial_models import LORENZ84 as STRONGER
+from udd.bifurcations.boundary_value import ConnectingCurve
+from udd.bifurcations.connecting_orbits import found_by
+from udd.bifurcations.flow_map import flow_of
+from udd.bifurcations.invariant_manifolds import direction_alone
 
 LORENZ84 = STRONGER.with_parameters({"G": 1.6, "F": 2.0})
 
@@ -104,7 +108,7 @@ def test_a_zero_hopf_point_of_lorenz_84() -> None:
 
 
 def test_the_second_lyapunov_coefficient_is_that_of_the_normal_form() -> None:
-    # z' = (mu + 2 i) z + a z |z|^2 + 0.7 z |z|^4 with x + i y = z, seen in bent coordinates.
+    # z' = (mu + 2 i) z + a z |z|^2 + 0.7 z |z|^4 with x + i y = z, in curved coordinates.
     x, y = "(u - 0.3*v^2)", "v"
     square = f"({x}^2 + v^2)"
     radial = f"(mu + a*{square} + 0.7*{square}^2)"
@@ -132,7 +136,7 @@ def test_homoclinic_orbits_are_followed_over_two_parameters() -> None:
     assert curve.kind == "homoclinic" and curve.ends == ("the bound 0.25", "the bound 1.5")
     assert curve.parameters == ("b", "m") and curve.values[0, 1] == 0.25 and curve.values[-1, 1] == 1.5
     assert all(one.error < 1e-9 for one in curve.solutions if isinstance(one, udd.Connection))
-    # Beside it the saddle's unstable manifold passes the saddle on its two sides, by another integrator.
+    # Next to the curve the unstable manifold passes the saddle on its two sides, by another integrator.
     b, m = curve.values[-1]
     saddle = np.sqrt(m)
 
@@ -204,3 +208,36 @@ def test_a_saddle_node_on_an_invariant_circle_is_named() -> None:
     snic = udd.connection(branch)
     assert snic.kind == "SNIC" and abs(snic.value - 1.0) <= snic.error < 1e-10
     assert snic.equilibrium.state == pytest.approx([-1.0, 0.0], abs=1e-6) and "SNIC" in repr(snic)
+
+
+def _homoclinic_of_bazykin(al: float, d: float, rest: list[float], time: float) -> udd.Connection:
+    """The homoclinic orbit near these parameters, from a run that leaves the saddle."""
+    model = BAZYKIN.with_parameters({"al": al, "d": d})
+    flow = flow_of(model, np.array([rest]))
+    way = direction_alone(flow, flow.values, np.array(rest), 1.0)
+    assert way is not None
+    start = np.array(rest) - 1e-2 * flow.size * way.vector
+    run = udd.simulate(model, np.arange(0.0, time, 0.5), start, method="auto")
+    index, one = flow.index("al"), np.ones(2)
+    guess = ConnectingCurve.through(flow, flow.values, index, np.array(rest), one, run.state, run.t[-1])
+    return found_by(*guess, "al")
+
+
+def test_a_homoclinic_curve_passes_beside_the_fold_of_its_saddle() -> None:
+    # Between the fold and the curve lies less than a step: at a fixed parameter there is no saddle ahead.
+    start = _homoclinic_of_bazykin(0.4461273, 0.1823132, [6.85824, 3.78123], 57.0)
+    assert start.kind == "homoclinic" and start.error < 1e-11
+    curve = udd.locus(start, "d", (0.18, 0.1975), within=(0.42, 0.46), ds=0.2, ds_max=0.4)
+    assert curve.ends == ("the bound 0.18", "the bound 0.1975")
+    # It was lost near al = 0.431, d = 0.193.
+    al = curve.values[np.argmin(np.abs(curve.values[:, 1] - 0.193)), 0]
+    assert al == pytest.approx(0.431, abs=2e-2) and len(curve) > 3
+    assert all(isinstance(one, udd.Connection) and one.error < 1e-9 for one in curve.solutions)
+
+
+def test_a_curve_begins_where_it_enters_the_bounds() -> None:
+    start = _homoclinic_of_bazykin(0.4461273, 0.1823132, [6.85824, 3.78123], 57.0)
+    curve = udd.locus(start, "d", (0.183, 0.184), within=(0.4, 0.5), ds=0.2, ds_max=0.4)
+    assert curve.values[0, 1] == 0.183 and curve.values[-1, 1] == 0.184
+    with pytest.raises(udd.UddError, match="does not lead into the bounds of d"):
+        udd.locus(start, "d", (0.21, 0.22), within=(0.43, 0.46), ds=0.2, ds_max=0.4)

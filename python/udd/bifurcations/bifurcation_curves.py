@@ -238,6 +238,7 @@ def _of_connections(
     if parameter == start.parameter:
         raise ModelError(f"the second parameter must be another than {parameter}")
     way = ConnectionWay((start.parameter, parameter), box, ds, ds_max, most)
+    start = way.entered(start)
     (back, first), (on, last) = (way.follow(start, sense) for sense in (-1.0, 1.0))
     found = [*back[:0:-1], *on]
     nothing = np.full(len(found), np.nan)
@@ -254,7 +255,7 @@ def _of_connections(
 
 @dataclass(frozen=True, eq=False)
 class _Note:
-    """What a locus says of one of its points."""
+    """One point of a locus: parameters, solution and frequency."""
 
     values: Floats
     solution: Equilibrium | PeriodicOrbit
@@ -263,7 +264,7 @@ class _Note:
 
 @dataclass
 class _Trace:
-    """What was met on the way, and why it ends."""
+    """Points of a locus in one direction, and why it ends."""
 
     notes: list[_Note]
     points: list[LocusPoint]

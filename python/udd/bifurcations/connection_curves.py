@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from udd.errors import IntegrationError, ModelError
 
+from .boundary_value import ConnectingCurve
 from .branch_continuation import unit_of
-from .connecting_orbits import Connection, Problem, found_by
+from .connecting_orbits import Connection, found_by
 from .flow_map import Floats
+from .pseudo_arclength import (
+    CorrectorFailed,
+    CurvePoint,
+    newton_corrector,
+    predictor_corrector_step,
+    tangent_at,
+)
+from .shooting_curve import HELD
 
 __all__ = ["ConnectionWay"]
 
-_NEAR = 2e-2  # typical sizes from the equilibrium, where the orbit is cut before it is prolonged anew
-_TURN = 0.9  # least cosine between one direction and the next
-_SHORTEST = 1e-4  # step
+_SHORTEST = 1e-6  # step
+_SHAPE = 0.1  # weight of the orbit's shape in the arclength, relative to that of a parameter
+_FLAT = 5e-3  # typical sizes: an orbit whose ends are further away leaves or comes ever more slowly
+_ON = 1e-9  # part of a step within which a point lies on the bound
 
 
 @dataclass(frozen=True)
 class ConnectionWay:
-    """How a curve of connections is followed in the plane of two parameters.
+    """How a curve of connections is followed over two parameters.
 
     Attributes
     ----------
@@ -39,99 +48,107 @@ class ConnectionWay:
     longest: float
     most: int
 
-    def follow(self, start: Connection, sense: float) -> tuple[list[tuple[Floats, Connection]], str]:
-        """Both parameters and the connections, and why the curve ends."""
-        problem = start._problem
-        if problem is None:
+    def entered(self, start: Connection) -> Connection:
+        """Return the connection where its curve enters the bounds of the second parameter; `start` if inside.
+
+        Raises
+        ------
+        ModelError
+            The curve does not lead to these bounds.
+        """
+        if start._orbit is None:
             raise ModelError("this connection was not made by udd.connection or udd.connections")
-        indices = [problem.flow.index(name) for name in self.parameters]
-        p = problem.values_at(start.value)[indices]
-        pairs = zip(p.tolist(), self.box.tolist(), strict=True)
-        # In the plane of the parameters alone the curve is nearly straight: long steps.
-        unit = 5.0 * np.array([unit_of(value, *bounds) for value, bounds in pairs])
-        found, direction, step = [(p, start)], np.array([0.0, sense]), self.step
+        curve, u = start._orbit
+        value, (low, high) = float(curve.values_at(u)[curve.flow.index(self.parameters[1])]), self.box[1]
+        if low <= value <= high:
+            return start
+        bound = low if value < low else high
+        box = np.array([self.box[0], sorted((value, bound))])
+        way = replace(self, box=box)
+        found, end = way.follow(start, float(np.sign(bound - value)))
+        if end != f"the bound {bound:.6g}":
+            raise ModelError(f"the curve does not lead into the bounds of {self.parameters[1]}: {end}")
+        return found[-1][1]
+
+    def follow(self, start: Connection, sense: float) -> tuple[list[tuple[Floats, Connection]], str]:
+        """Return both parameters and the connections from one inside the bounds on, and why it ends."""
+        assert start._orbit is not None
+        curve, u = start._orbit
+        first, second = (curve.flow.index(name) for name in self.parameters)
+        values = curve.values_at(u)
+        p = values[[first, second]]
+        scales = np.array([unit_of(v, *b) for v, b in zip(p.tolist(), self.box.tolist(), strict=True)])
+        weight = _SHAPE / float(np.sqrt(len(curve.nodes(u))))
+        curve, u = curve.over((first, second), u, scales, weight)
+        found, step, along = [(p, start)], self.step, np.append(np.zeros(len(u) - 1), sense)
         while len(found) <= self.most:
-            trial, reason = None, "the curve turns too sharply"
-            while trial is None and step >= _SHORTEST:
-                guess = p + step * direction * unit
-                k = int(np.argmax(np.abs(direction)))
-                bound = self._bound(guess, k)
-                if bound is not None:
-                    guess = p + (bound - p[k]) / (direction[k] * unit[k]) * direction * unit
-                    guess[k] = bound
-                if bound is not None and abs(guess[k] - p[k]) < 1e-9 * unit[k]:
-                    return found, f"the bound {bound:.6g}"
-                try:
-                    trial = self._solved(found[-1][1], indices, guess, k)
-                    there = guess.copy()
-                    there[1 - k] = trial.value
-                    way = (there - p) / unit
-                    if way @ direction < _TURN * np.linalg.norm(way) and len(found) > 1:
-                        trial = None
-                except (ModelError, IntegrationError, np.linalg.LinAlgError) as error:
-                    reason = str(error)
-                step = step if trial is not None else 0.5 * step
-            if trial is None:
-                return found, f"lost: {reason}"
-            outside = self._bound(there, 1 - k)
-            if outside is not None:
-                found += self._at_bound(found[-1][1], indices, p, there, 1 - k, outside)
-                return found, f"the bound {outside:.6g}"
-            p, direction = there, way / np.linalg.norm(way)
-            found.append((p, self._named(trial, p)))
-            if bound is not None:
-                return found, f"the bound {bound:.6g}"
-            step = min(self.longest, 1.4 * step)
+            try:
+                curve, here = _cut(curve, u, along)
+                there, _, step = predictor_corrector_step(curve, here, step, self.longest, _SHORTEST)
+                met = self._bound(curve, here, there)
+                if met is not None and met[0] < _ON:
+                    return found, f"the bound {met[1]:.6g}"
+                trial = self._connection(curve, there.u if met is None else met[2])
+            except (CorrectorFailed, ModelError, IntegrationError, np.linalg.LinAlgError) as error:
+                return found, f"lost: {error}"
+            assert trial._orbit is not None
+            curve, u = trial._orbit[0].over((first, second), trial._orbit[1], scales, weight)
+            along = there.tangent
+            found.append((curve.parameters(u), trial))
+            if met is not None:
+                return found, f"the bound {met[1]:.6g}"
+            if trial.nearest > _FLAT and len(found) > 2:
+                return found, self._fold_ahead(*found[-2:])
         return found, "as many points as were wanted"
 
-    def _named(self, found: Connection, p: Floats) -> Connection:
-        """The connection over the first parameter, whichever of them was solved for."""
-        if found.parameter == self.parameters[0]:
-            return found
-        problem = copy.copy(found._problem)
-        assert problem is not None
-        problem.values = problem.values_at(problem.value)
-        problem.parameter, problem.value = problem.flow.index(self.parameters[0]), float(p[0])
-        problem._rests = {}
+    def _fold_ahead(self, before: tuple[Floats, Connection], last: tuple[Floats, Connection]) -> str:
+        """Return where the slowest eigenvalue vanishes, extrapolated: the orbit's equilibrium folds there."""
+        slow = [float(np.abs(one.equilibrium.eigenvalues.real).min()) for _, one in (before, last)]
+        part = slow[1] / (slow[0] - slow[1]) if slow[0] > slow[1] else 0.0
+        p, q = last[0] + part * (last[0] - before[0])
+        return (
+            f"a saddle-node of equilibria near {self.parameters[0]} = {p:.5g}, {self.parameters[1]} = {q:.5g}"
+        )
+
+    def _connection(self, curve: ConnectingCurve, u: Floats) -> Connection:
+        """Return the connection with its bound, over the first parameter; over the second if that turns."""
+        pair = curve.free
         try:
-            return found_by(problem, self.parameters[0])
-        except (ModelError, IntegrationError):
-            return found
+            return found_by(
+                *curve.over((pair[0], HELD), u, np.array([curve.scales[0], 1.0])), self.parameters[0]
+            )
+        except ModelError:
+            return found_by(
+                *curve.over((pair[1], HELD), u, np.array([curve.scales[1], 1.0])), self.parameters[1]
+            )
 
-    def _bound(self, p: Floats, k: int) -> float | None:
-        low, high = self.box[k].tolist()
-        return None if low <= p[k] <= high else low if p[k] < low else high
-
-    def _at_bound(
-        self, near: Connection, indices: list[int], p: Floats, there: Floats, k: int, bound: float
-    ) -> list[tuple[Floats, Connection]]:
-        guess = p + (there - p) * ((bound - p[k]) / (there[k] - p[k]))
-        guess[k] = bound
-        try:
-            found = self._solved(near, indices, guess, k)
-        except (ModelError, IntegrationError, np.linalg.LinAlgError):
-            return []
-        guess[1 - k] = found.value
-        return [(guess, self._named(found, guess))]
-
-    def _solved(self, near: Connection, indices: list[int], guess: Floats, fixed: int) -> Connection:
-        """The connection near another one at a value of the `fixed` parameter, by the other parameter."""
-        assert near._problem is not None
-        problem = trimmed(near._problem)
-        values = problem.values.copy()
-        values[indices] = guess
-        problem.values, problem.parameter = values, indices[1 - fixed]
-        problem.value, problem._rests = float(guess[1 - fixed]), {}
-        return found_by(problem, self.parameters[1 - fixed])
+    def _bound(
+        self, curve: ConnectingCurve, here: CurvePoint, there: CurvePoint
+    ) -> tuple[float, float, Floats] | None:
+        """Return the part of a step at which it meets a bound, the bound and the point; None for no bound."""
+        before, after = curve.parameters(here.u), curve.parameters(there.u)
+        met = []
+        for k, (low, high) in enumerate(self.box.tolist()):
+            if not low <= after[k] <= high:
+                bound = low if after[k] < low else high
+                met.append(((bound - before[k]) / (after[k] - before[k]), k, bound))
+        if not met:
+            return None
+        part, k, bound = min(met)
+        guess, row = here.u + part * (there.u - here.u), np.zeros(len(here.u))
+        row[k - 2] = 1.0
+        guess[k - 2] = bound / curve.scales[k]
+        return part, bound, newton_corrector(curve, guess, row, patience=20)
 
 
-def trimmed(problem: Problem) -> Problem:
-    """The orbit without what lies near the equilibrium at its ends, which is prolonged for other values."""
-    rest = problem.rest(problem.value)
-    short, size = copy.copy(problem), problem.flow.size
-    first = np.linalg.norm((problem.nodes - rest) / size, axis=1) > _NEAR
-    last = np.linalg.norm((problem.mirror * problem.nodes - rest) / size, axis=1) > _NEAR
-    begin, end = max(int(np.argmax(first)) - 1, 0), len(last) - max(int(np.argmax(last[::-1])) - 1, 0)
-    short.nodes = problem.nodes[begin:end].copy()
-    short.span = problem.span * (len(short.nodes) - 1) / (len(problem.nodes) - 1)
-    return short
+def _cut(curve: ConnectingCurve, u: Floats, along: Floats) -> tuple[ConnectingCurve, CurvePoint]:
+    """Return the curve of orbits cut near their equilibria, and the point there; it leads along a direction.
+
+    Only the direction's equilibria and parameters count, because the cut orbit has other nodes.
+    """
+    short, v = curve.trimmed(u)
+    ahead, same = np.zeros(len(v)), curve.ends * curve.flow.dim + 2
+    ahead[-same:] = along[-same:]
+    ahead /= np.linalg.norm(ahead)
+    short, v = short.solved(v, ahead)
+    return short, CurvePoint(v, tangent_at(short, v, ahead))

@@ -16,8 +16,9 @@ from udd.errors import IntegrationError, ModelError
 from udd.models import Model, beyond_the_edge
 from udd.simulation.trajectory import simulate
 
+from .boundary_value import ConnectingCurve
 from .branch_continuation import bounds_of
-from .connecting_orbits import Connection, Problem, found_by
+from .connecting_orbits import Connection, found_by
 from .equilibrium_search import equilibria, refined
 from .flow_map import Floats, FlowMap, flow_of
 from .invariant_manifolds import Eigendirection, direction_alone
@@ -120,8 +121,8 @@ def connections(
 
     Notes
     -----
-    Of each equilibrium that has one eigenvalue alone on its side of the imaginary axis, the manifold along it
-    is a pair of curves, followed forward or backward in time. An interval at whose ends these curves take
+    If one eigenvalue of an equilibrium is alone on its side of the imaginary axis, the manifold along it is a
+    pair of curves. These are followed forward or backward in time. An interval at whose ends they take
     different courses is cut again and again; where they part at the equilibrium, or at its mirror image,
     which they pass on two sides, there is a connection between, and Newton's method finds it as
     :func:`udd.connection` does. About a connection with a slow spiral there are infinitely many others, which
@@ -180,7 +181,7 @@ def _extent(model: Model, rests: list[Floats]) -> Floats:
     times = np.linspace(0.0, _SHOWN * clock, 10 * _FINE)
     seen = [np.ones(len(model.state_names)) if not rests else rests[0]]
     for rest in rests:
-        # What blows up does so later than half of the time, or than a quarter, ...
+        # A run that blows up may last for half of the time, or for a quarter, ...
         for part in 0.5 ** np.arange(8):
             try:
                 aside = rest + _ASIDE * (1.0 + np.abs(rest))
@@ -215,7 +216,7 @@ class _Manifold:
         return values
 
     def rest_near(self, value: float, guess: Floats) -> Floats | None:
-        """The equilibrium near a guess; where Powell's method stalls, from a little beside it."""
+        """Return the equilibrium near a guess; if Powell's method stalls, start next to the guess."""
         aside = np.random.default_rng(8).uniform(-_ASIDE, _ASIDE, (_TRIES, len(guess)))
         for shift in (np.zeros(len(guess)), *aside):
             found = refined(self.flow, self.values_at(value), guess + shift * self.flow.size)
@@ -381,7 +382,8 @@ class _Manifold:
             # Followed backward: the orbit comes from the target.
             nodes, rest = nodes[::-1].copy(), mirror * rest
         values = self.values_at(curve.value)
-        return found_by(Problem(flow, values, self.index, rest, mirror, nodes, span, curve.value), parameter)
+        guess = ConnectingCurve.through(flow, values, self.index, rest, mirror, nodes, span)
+        return found_by(*guess, parameter)
 
 
 def _same(one: Connection, other: Connection) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 
 from udd.errors import IntegrationError
 
-from .condensation import CyclicEquations
 from .flow_map import Floats
 
 __all__ = [
@@ -36,10 +35,22 @@ class CorrectorFailed(Exception):
     """Newton's method did not converge."""
 
 
+class Matrix(Protocol):
+    """Derivatives (n, n + 1) with a structure of their own."""
+
+    def toarray(self) -> Floats:
+        """Return the matrix as an array."""
+        ...
+
+    def solve(self, row: Floats, right: Floats) -> Floats:
+        """Return the unknowns for these right sides, of which the last is that of one more `row`."""
+        ...
+
+
 class Curve(Protocol):
     """`n` equations for `n + 1` scaled unknowns."""
 
-    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
+    def equations(self, u: Floats) -> tuple[Floats, Floats | Matrix]:
         """Residuals (n,) and their derivatives (n, n + 1)."""
         ...
 
@@ -52,7 +63,7 @@ class CurvePoint:
     tangent: Floats
 
 
-def solve(matrix: Floats | CyclicEquations, row: Floats, right: Floats) -> Floats:
+def solve(matrix: Floats | Matrix, row: Floats, right: Floats) -> Floats:
     """The solution of the equations below which one more row stands."""
     result: Floats
     if isinstance(matrix, np.ndarray):
@@ -76,8 +87,12 @@ def natural_constraint(u: Floats) -> Floats:
     return row
 
 
-def newton_corrector(curve: Curve, guess: Floats, row: Floats, patience: int = _MOST) -> Floats:
-    """The point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
+def newton_corrector(
+    curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, longest: float = np.inf
+) -> Floats:
+    """Return the point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
+
+    No component changes by more than `longest` in one step.
 
     Raises
     ------
@@ -91,9 +106,9 @@ def newton_corrector(curve: Curve, guess: Floats, row: Floats, patience: int = _
             raise CorrectorFailed(str(error)) from None
         step = solve(matrix, row, np.append(-residual, row @ (guess - u)))
         size = float(np.abs(step).max())
-        if not np.isfinite(size) or size > 1e3:
+        if not np.isfinite(size) or (size > 1e3 and longest > 1e3):
             raise CorrectorFailed("Newton's method diverges")
-        u = u + step
+        u = u + step * (min(1.0, longest / size) if size > 0.0 else 1.0)
         if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
             return u
         before = size
