@@ -161,7 +161,7 @@ def homoclinic_orbits() -> list[float]:
     found.append(row("homoclinic orbit of a jerk", one.value, returning(one.value, *JERK), one.error))
     texts = ["10*(y - x)", "r*x - y - x*z", "x*y - 2*z"]
     lorenz = udd.Model(["x", "y", "z"], texts, {"r": 12.0})
-    (one,) = udd.connections(lorenz, "r", (10.0, 16.0), n=3, t_max=2.0)
+    (one,) = udd.connections(lorenz, "r", (8.0, 20.0), n=8)
     found.append(row("homoclinic orbit of Lorenz", one.value, returning(one.value, *LORENZ), one.error))
     return found
 

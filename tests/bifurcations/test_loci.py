@@ -210,34 +210,34 @@ def test_a_saddle_node_on_an_invariant_circle_is_named() -> None:
     assert snic.equilibrium.state == pytest.approx([-1.0, 0.0], abs=1e-6) and "SNIC" in repr(snic)
 
 
-def _homoclinic_of_bazykin(al: float, d: float, rest: list[float], time: float) -> udd.Connection:
-    """The homoclinic orbit near these parameters, from a run that leaves the saddle."""
+@pytest.fixture(scope="module")
+def homoclinic() -> udd.Connection:
+    """An orbit homoclinic to a saddle of Bazykin's model, near the fold of the saddle."""
+    al, d = 0.4316712, 0.1928323
     model = BAZYKIN.with_parameters({"al": al, "d": d})
-    flow = flow_of(model, np.array([rest]))
-    way = direction_alone(flow, flow.values, np.array(rest), 1.0)
+    pole = np.polynomial.Polynomial([1.0, al])
+    cubic = np.polynomial.Polynomial([0, 1]) - pole - d * np.polynomial.Polynomial([1, -0.01]) * pole**2
+    x = float(np.sort(cubic.roots().real)[1])
+    rest = np.array([x, (1.0 - 0.01 * x) * (1.0 + al * x)])
+    flow = flow_of(model, rest[np.newaxis])
+    way = direction_alone(flow, flow.values, rest, 1.0)
     assert way is not None
-    start = np.array(rest) - 1e-2 * flow.size * way.vector
-    run = udd.simulate(model, np.arange(0.0, time, 0.5), start, method="auto")
-    index, one = flow.index("al"), np.ones(2)
-    guess = ConnectingCurve.through(flow, flow.values, index, np.array(rest), one, run.state, run.t[-1])
+    times, start = np.arange(0.0, 60.0, 0.5), rest - 1e-2 * flow.size * way.vector
+    path = udd.simulate(model, times, start, method="auto").state
+    last = 40 + int(np.argmin(np.linalg.norm((path[40:] - rest) / flow.size, axis=1)))
+    nodes, index = path[: last + 1], flow.index("al")
+    guess = ConnectingCurve.through(flow, flow.values, index, rest, np.ones(2), nodes, times[last])
     return found_by(*guess, "al")
 
 
-def test_a_homoclinic_curve_passes_beside_the_fold_of_its_saddle() -> None:
-    # Between the fold and the curve lies less than a step: at a fixed parameter there is no saddle ahead.
-    start = _homoclinic_of_bazykin(0.4461273, 0.1823132, [6.85824, 3.78123], 57.0)
-    assert start.kind == "homoclinic" and start.error < 1e-11
-    curve = udd.locus(start, "d", (0.18, 0.1975), within=(0.42, 0.46), ds=0.2, ds_max=0.4)
-    assert curve.ends == ("the bound 0.18", "the bound 0.1975")
-    # It was lost near al = 0.431, d = 0.193.
-    al = curve.values[np.argmin(np.abs(curve.values[:, 1] - 0.193)), 0]
-    assert al == pytest.approx(0.431, abs=2e-2) and len(curve) > 3
+def test_a_homoclinic_curve_passes_beside_the_fold_of_its_saddle(homoclinic: udd.Connection) -> None:
+    # The curve was lost here: at a fixed parameter the saddle does not exist a step ahead.
+    assert homoclinic.kind == "homoclinic" and homoclinic.value == pytest.approx(0.431671, abs=1e-5)
+    curve = udd.locus(homoclinic, "d", (0.192, 0.1935), within=(0.4, 0.5), ds=0.5, ds_max=1.0)
+    assert curve.ends == ("the bound 0.192", "the bound 0.1935") and len(curve) > 2
     assert all(isinstance(one, udd.Connection) and one.error < 1e-9 for one in curve.solutions)
 
 
-def test_a_curve_begins_where_it_enters_the_bounds() -> None:
-    start = _homoclinic_of_bazykin(0.4461273, 0.1823132, [6.85824, 3.78123], 57.0)
-    curve = udd.locus(start, "d", (0.183, 0.184), within=(0.4, 0.5), ds=0.2, ds_max=0.4)
-    assert curve.values[0, 1] == 0.183 and curve.values[-1, 1] == 0.184
-    with pytest.raises(udd.UddError, match="does not lead into the bounds of d"):
-        udd.locus(start, "d", (0.21, 0.22), within=(0.43, 0.46), ds=0.2, ds_max=0.4)
+def test_a_homoclinic_curve_begins_where_it_enters_the_bounds(homoclinic: udd.Connection) -> None:
+    curve = udd.locus(homoclinic, "d", (0.193, 0.1931), within=(0.4, 0.5), ds=1.0, ds_max=1.0)
+    assert curve.values[0, 1] == 0.193 and curve.values[-1, 1] == 0.1931

@@ -162,6 +162,10 @@ def locus(
     of Hopf points end), Bautin points (the first Lyapunov coefficient is zero) and zero-Hopf points. Bounds
     come from the scatter of the values near by.
 
+    A curve of homoclinic orbits has its equilibrium among the unknowns, so it passes close to a fold of that
+    equilibrium. If it ends in the fold, the end is "a saddle-node of equilibria" with its extrapolated place.
+    If the orbit lies outside the bounds of the second parameter, the curve begins where it enters them.
+
     Examples
     --------
     Where rotation becomes stable, ``w = (1 - B)/(B (1 + B))``:

@@ -173,8 +173,9 @@ class ConnectingCurve:
         middle = nodes[len(nodes) // 2]
         rate = flow.with_values(values).rates(0.0, flow.full(middle))[flow.kept] / flow.size
         first, last = (self._projectors(rests[k], values, k)[k] for k in (0, -1))
-        planes = tuple(np.linalg.svd(p.T)[0][:, : round(float(np.trace(p)))].T for p in (first, last))
-        return replace(self, planes=planes, reference=middle / flow.size, across=rate / np.linalg.norm(rate))
+        begin, end = (np.linalg.svd(p.T)[0][:, : round(float(np.trace(p)))].T for p in (first, last))
+        across = rate / np.linalg.norm(rate)
+        return replace(self, planes=(begin, end), reference=middle / flow.size, across=across)
 
     def _projectors(self, rest: Floats, values: Floats, end: int) -> tuple[Floats, Floats]:
         """On the plane of the decaying eigenvectors along that of the growing ones, and the reverse."""
@@ -230,15 +231,18 @@ class ConnectingCurve:
         by_parameter = np.zeros((m * r, few))
         for j, scale in enumerate(self.scales[: len(wanted)].tolist()):
             by_parameter[:, k * r + j] = (runs.by_parameter[:, :, j] / size * scale).ravel()
-        pieces = sparse.block_diag([*flow.scaled(runs.by_state)], format="csr")
-        nothing = sparse.csr_matrix((m * r, r))
-        gaps = sparse.hstack([pieces, nothing]) - sparse.hstack([nothing, sparse.identity(m * r)])
-        by_nodes = sparse.lil_matrix(((k + 1) * r + 1, n))
+        # Each piece brings two blocks, of the node where it starts and of that where it ends.
+        pieces = np.empty((2 * m, r, r))
+        pieces[::2], pieces[1::2] = flow.scaled(runs.by_state), -np.eye(r)
+        where = np.repeat(np.arange(m), 2)
+        where[1::2] += 1
+        gaps = sparse.bsr_matrix((pieces / weight, where, np.arange(0, 2 * m + 1, 2)), shape=(m * r, n))
+        by_nodes = np.zeros(((k + 1) * r + 1, n))
         by_nodes[k * r : k * r + len(begin), :r] = begin
         by_nodes[k * r + len(begin) : (k + 1) * r, m * r :] = end * self.mirror
         by_nodes[-1, middle * r : middle * r + r] = self.across
         below = np.vstack([by_rest, by_few, np.zeros(few)])
-        blocks = [[gaps / weight, by_parameter], [by_nodes / weight, below]]
+        blocks = [[gaps, by_parameter], [by_nodes / weight, below]]
         return residual, SparseEquations(sparse.bmat(blocks, format="csr"))
 
     def solved(self, guess: Floats, row: Floats | None = None) -> tuple[ConnectingCurve, Floats]:
@@ -289,9 +293,11 @@ class ConnectingCurve:
             rates = np.linalg.eigvals(matrix).real
             slowest = float(np.abs(rates[rates < 0.0]).min(initial=np.inf))
             time = min(_LONGER / slowest, _LONGEST * flow.clock)
-            steps = np.arange(1, max(1, int(np.ceil(time / share))) + 1)
-            added.append([rest + size * (linalg.expm(k * share * matrix) @ kept) for k in steps.tolist()])
-        longer = np.vstack([added[0][::-1], nodes, self.mirror * np.array(added[1])])
+            step, states = linalg.expm(share * matrix), [kept]
+            for _ in range(max(1, int(np.ceil(time / share)))):
+                states.append(step @ states[-1])
+            added.append(rest + size * np.array(states[1:]))
+        longer = np.vstack([added[0][::-1], nodes, self.mirror * added[1]])
         return replace(self, span=share * (len(longer) - 1)), self.pack(longer, rests, values)
 
     def trimmed(self, u: Floats) -> tuple[ConnectingCurve, Floats]:

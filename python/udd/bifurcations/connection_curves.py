@@ -88,7 +88,7 @@ class ConnectionWay:
                 met = self._bound(curve, here, there)
                 if met is not None and met[0] < _ON:
                     return found, f"the bound {met[1]:.6g}"
-                trial = self._connection(curve, there.u if met is None else met[2])
+                trial = self._connection(curve, there.u if met is None else met[3])
             except (CorrectorFailed, ModelError, IntegrationError, np.linalg.LinAlgError) as error:
                 return found, f"lost: {error}"
             assert trial._orbit is not None
@@ -96,6 +96,7 @@ class ConnectionWay:
             along = there.tangent
             found.append((curve.parameters(u), trial))
             if met is not None:
+                found[-1][0][met[2]] = met[1]
                 return found, f"the bound {met[1]:.6g}"
             if trial.nearest > _FLAT and len(found) > 2:
                 return found, self._fold_ahead(*found[-2:])
@@ -124,8 +125,8 @@ class ConnectionWay:
 
     def _bound(
         self, curve: ConnectingCurve, here: CurvePoint, there: CurvePoint
-    ) -> tuple[float, float, Floats] | None:
-        """Return the part of a step at which it meets a bound, the bound and the point; None for no bound."""
+    ) -> tuple[float, float, int, Floats] | None:
+        """Return the part of a step before a bound, the bound, the place of its parameter and the point."""
         before, after = curve.parameters(here.u), curve.parameters(there.u)
         met = []
         for k, (low, high) in enumerate(self.box.tolist()):
@@ -138,7 +139,7 @@ class ConnectionWay:
         guess, row = here.u + part * (there.u - here.u), np.zeros(len(here.u))
         row[k - 2] = 1.0
         guess[k - 2] = bound / curve.scales[k]
-        return part, bound, newton_corrector(curve, guess, row, patience=20)
+        return part, bound, k, newton_corrector(curve, guess, row, patience=20)
 
 
 def _cut(curve: ConnectingCurve, u: Floats, along: Floats) -> tuple[ConnectingCurve, CurvePoint]:
