@@ -369,7 +369,7 @@ def test_lens_and_tilt_come_out_of_rigidity() -> None:
     noisy = points + 0.03 * (rng.normal(size=points.shape) + 1j * rng.normal(size=points.shape))
     noisy[::3, 1] = np.nan
     bent = calibrate(noisy, (700, 550))
-    assert bent.found
+    assert bent.is_significant
     found = bent.lens
     # the standard error of the curve covers, to 4 of them
     assert 0 < bent.sigma[0] < 0.01 and abs(found.curve - true_lens.curve) < 4 * bent.sigma[0]
@@ -380,7 +380,7 @@ def test_lens_and_tilt_come_out_of_rigidity() -> None:
     assert spread.std() < 0.15 * before.std() and spread.std() < 0.1
     flat = plane + 0.03 * (rng.normal(size=points.shape) + 1j * rng.normal(size=points.shape))
     left = calibrate(flat, (700, 550))
-    assert left.lens.plain and not left.found  # nothing to mend is left alone
+    assert left.lens.plain and not left.is_significant  # nothing to mend is left alone
     given = calibrate(noisy, (700, 550), curve=0.014, tilt=0.0)
     assert (given.lens.curve, given.lens.tilt_u, given.sigma.tolist()) == (0.014, 0.0, [0.0] * 5)
 

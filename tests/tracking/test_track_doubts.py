@@ -53,7 +53,7 @@ def test_gravity_shows_the_clock_and_the_orientation(slower: float) -> None:
     for turn in (1, 1j, -1):
         place = (state[:, 1] + 1j * state[:, 2]) * turn
         found = apparent_gravity(slower * t, np.column_stack([place.real, place.imag, angle]), 0.08)
-        assert found is not None and found.known
+        assert found is not None and found.is_known
         assert found.slower == pytest.approx(slower, rel=0.05)  # a tenth makes a doubt
         assert abs(np.angle(1j * found.value / turn)) < 0.05
 

@@ -128,13 +128,13 @@ class TrackOptions:
             raise TrackError("length is a pendulum's: say its bob's colour too")
         self._check()
 
-    def changed(self, more: Mapping[str, Any]) -> TrackOptions:
+    def changed(self, changes: Mapping[str, Any]) -> TrackOptions:
         """The same with other values of some options."""
         said = {name: getattr(self, name) for name in FIELDS}
         if self.tags or self.bob is not None:  # from which the layout was made
             del said["layout"]
-        made = TrackOptions(**{**said, **more})
-        if self.tags and "layout" not in more:
+        made = TrackOptions(**{**said, **changes})
+        if self.tags and "layout" not in changes:
             made._set("tags", self.tags)
             made._set("layout", self.layout)
             made._check()
@@ -237,15 +237,15 @@ def read_apart(said: Any) -> MarkSeparation:
         It is something else.
     """
     try:
-        one, other, distance = said
-        numbers = all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in (one, other))
-        if not numbers or one == other or not 0 < float(distance) < math.inf:
+        first, other, distance = said
+        numbers = all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in (first, other))
+        if not numbers or first == other or not 0 < float(distance) < math.inf:
             raise ValueError
     except (TypeError, ValueError):
         raise TrackError(
             f"apart must be the numbers of two marks (from 1) and their distance in m, not {said!r}"
         ) from None
-    return one, other, float(distance)
+    return first, other, float(distance)
 
 
 def read_region(said: Any) -> Region:

@@ -341,7 +341,7 @@ def _to_metres(
     """Return the measurement in metres, without vague and gone frames; `twice`: of two passes."""
     if moved is not None and not moved.steady:
         why = lost("the background is not seen, and the camera moves")
-        tracks = tracks.without(~moved.known[: len(tracks)], why)
+        tracks = tracks.without(~moved.is_measured[: len(tracks)], why)
     disk = _upright(film, tracks, state, options, rim, twice, look_over)
     tracks, camera = disk.tracks, disk.camera
     drive = complex(np.conj(camera.drive)) * camera.scale

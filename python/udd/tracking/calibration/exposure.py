@@ -103,7 +103,7 @@ def _pull(
     fit = align(y, view, look, here, now, [MISFIT, MISFIT], gain_slack=0.3, keep=True)
     if fit is None:
         return 0.0, 0.0
-    pull = known = 0.0
+    pull = information = 0.0
     poses, locals_ = seen_at(look, here, now, y.shape[0])
     for mark, s, used, (u, v, angle), local in zip(
         look.marks, fit.sightings, fit.used, poses, locals_, strict=True
@@ -116,8 +116,8 @@ def _pull(
         )
         slope = mark.level * s.gain * beyond_place((more - less)[None] / (2 * SMALL), base, s)[0]
         pull += float((s.weight * slope) @ s.residual)
-        known += float((s.weight * slope) @ slope)
-    return pull, known
+        information += float((s.weight * slope) @ slope)
+    return pull, information
 
 
 def _misfit(m: Moving, share: float, look: DiskAppearance, view: NDArray[np.bool_]) -> float:

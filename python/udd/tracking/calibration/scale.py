@@ -42,11 +42,11 @@ def scale(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions
     said = None if options.scale is None else Scale(options.scale, options.sigma.scale, "given")
     if said is not None and not (said.sigma and options.calibrate.scale):
         return said
-    film = _found(places, rim, options)
+    film = _from_film(places, rim, options)
     if said is None or film is None:
         return film or said or _by_marks(places, options)  # one is there
     if abs(film.value - said.value) < APART * np.hypot(film.sigma, said.sigma):
-        return _both(film, said)
+        return _combined(film, said)
     warnings.warn(
         f"the film shows {film.value:.1f} pixels per metre (by its {film.origin}), not the {said.value:.1f} "
         "that are given; the film is believed",
@@ -61,14 +61,14 @@ def _by_rim(rim: Rim, options: TrackOptions) -> Scale:
     )
 
 
-def _both(film: Scale, said: Scale) -> Scale:
+def _combined(film: Scale, said: Scale) -> Scale:
     """Mean of what is found and what is said, each by its uncertainty."""
     share = film.sigma**2 / (film.sigma**2 + said.sigma**2)  # of what is said
     origin = film.origin if share < MINOR else f"{film.origin}, and given"
     return Scale(film.value + share * (said.value - film.value), float(np.sqrt(share)) * said.sigma, origin)
 
 
-def _found(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions) -> Scale | None:
+def _from_film(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions) -> Scale | None:
     """The film's own; None where it shows nothing that was not said."""
     if options.apart is not None:
         one, other, distance = options.apart

@@ -140,12 +140,12 @@ def locate_bob(picture: Picture, behind: Background, colour: BobColour) -> Blob 
     """
     import cv2
 
-    more = _pale_excess(picture, behind, colour) if colour.pale else _excess(picture, behind, colour)
-    strong = more > STRONG
+    excess = _pale_excess(picture, behind, colour) if colour.pale else _excess(picture, behind, colour)
+    strong = excess > STRONG
     if colour.pale:
         thick = _thickest(strong, SMALL // 4)
         strong = np.zeros_like(strong) if thick is None else thick
-        more = np.where(strong, more, np.float32(0))
+        excess = np.where(strong, excess, np.float32(0))
     patches: Blobs = blobs(strong, SMALL // 4, 1)
     if not len(patches.centre):
         return None
@@ -156,7 +156,7 @@ def locate_bob(picture: Picture, behind: Background, colour: BobColour) -> Blob 
     box = (r0, r1, c0, c1)
     change = _light(picture, box, behind.full_range) - _light(behind.picture, box, behind.full_range)
     solid = cv2.resize(
-        (more[half] > 2 * STRONG).astype(np.uint8), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST
+        (excess[half] > 2 * STRONG).astype(np.uint8), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST
     )[: shape[0], : shape[1]]
     if solid.sum() < SMALL:
         return None

@@ -53,7 +53,7 @@ class CameraMotion:
     middle: complex
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def is_measured(self) -> NDArray[np.bool_]:
         """Frames whose background was seen."""
         return np.asarray(np.isfinite(self.shift))
 
@@ -77,7 +77,7 @@ class CameraMotion:
     @property
     def steady(self) -> bool:
         """Whether the camera was at rest."""
-        if not self.known.any():
+        if not self.is_measured.any():
             return True
         away = np.abs(self.moved) + self.turned * abs(self.middle)
         unsure = self.sigma[:, 0] + self.sigma[:, 2] * abs(self.middle)
@@ -86,7 +86,7 @@ class CameraMotion:
     @property
     def as_bright(self) -> bool:
         """Whether the light stays nearly the same."""
-        return not self.known.any() or bool(np.nanmax(np.abs(self.gain - 1)) < AS_BRIGHT)
+        return not self.is_measured.any() or bool(np.nanmax(np.abs(self.gain - 1)) < AS_BRIGHT)
 
     @property
     def text(self) -> str:
@@ -101,7 +101,7 @@ class CameraMotion:
         if not self.as_bright:
             ratio = np.nanmax(self.gain) / np.nanmin(self.gain)
             said.append(f"the light of the pictures changes by a factor of {ratio:.2f}")
-        lost = int((~self.known).sum())
+        lost = int((~self.is_measured).sum())
         frames = "one frame" if lost == 1 else f"{lost} frames"
         rest = f", but for {frames} without a background" if lost and not self.steady else ""
         return f"{' and '.join(said)}: what stands still about the disk shows it, and it is undone{rest}"
@@ -116,7 +116,7 @@ class CameraMotion:
 
     def correction(self, before: Correction) -> Correction:
         """Return what steadies the pictures; frames without a known view keep the last one."""
-        last = np.maximum.accumulate(np.where(self.known, np.arange(len(self.shift)), 0))
+        last = np.maximum.accumulate(np.where(self.is_measured, np.arange(len(self.shift)), 0))
         none, full = np.empty(0, np.complex128), before.full_range
         factor, shift = (none, none) if self.steady else (self.factor[last], self.shift[last])
         gain = np.empty(0) if self.as_bright else self.gain[last]
@@ -137,7 +137,7 @@ class CameraMotion:
 
 def _about_median(motion: CameraMotion) -> CameraMotion:
     """The same motion against the camera's usual view: the first one's roll is no better than another's."""
-    if not motion.known.any():
+    if not motion.is_measured.any():
         return motion
     factor, middle = motion.factor, motion.middle
     usual = complex(np.nanmedian(factor.real), np.nanmedian(factor.imag))
@@ -170,11 +170,11 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     if not background.learned(whole):
         return None
     seen = background.follow(whole[::2])
-    if seen.known.mean() < KNOWN or (seen.steady and seen.as_bright):
+    if seen.is_measured.mean() < KNOWN or (seen.steady and seen.as_bright):
         return None
     moved = background.follow(film.pictures())
     still = moved.steady and moved.as_bright
-    return None if still or moved.known.mean() < KNOWN else moved
+    return None if still or moved.is_measured.mean() < KNOWN else moved
 
 
 class _Seen(NamedTuple):
@@ -247,7 +247,7 @@ class Background:
             if points is None:
                 continue
             used, there = points
-            more, away, rest, sigma = _similar(
+            factor_step, away, rest, sigma = _similar(
                 self.points[used].astype(float) @ [1, 1j],
                 there.astype(float) @ [1, 1j],
                 self.spread[used],
@@ -255,7 +255,7 @@ class Background:
             )
             if sigma[0] > UNSURE:
                 continue
-            self.view, self.failed = (factor * more, factor * away + shift), 0
+            self.view, self.failed = (factor * factor_step, factor * away + shift), 0
             seen = self._light(_seen_from(y, *self.view), self.points[used])
             gain = float(np.median(seen / np.maximum(self.bright[used], 1.0)))
             return _Seen((*self.view, gain, sigma), used, rest)

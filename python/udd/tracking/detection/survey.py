@@ -87,7 +87,7 @@ def slowest(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[tup
             for j in (k - 1, k + 1):
                 other = here[j] if 0 <= j < len(burst) else None
                 if other is not None:
-                    moves.append(_apart(sight, other))
+                    moves.append(_distance(sight, other))
             rows.append((float(np.mean(moves)) if moves else np.inf, picture, sight))
     ordered = sorted(rows, key=lambda item: item[0])
     return [(p, s) for _, p, s in repeats_last(ordered, [s for *_, s in ordered])]
@@ -99,12 +99,12 @@ def repeats_last(items: list[Any], sights: list[Sight]) -> list[Any]:
     again: list[int] = []
     for k, sight in enumerate(sights):
         # a disk at rest teaches nothing new
-        repeated = any(_apart(sight, sights[j]) < NEW * sight.reach for j in first)
+        repeated = any(_distance(sight, sights[j]) < NEW * sight.reach for j in first)
         (again if repeated else first).append(k)
     return [items[k] for k in first + again]
 
 
-def _apart(a: Sight, b: Sight) -> float:
+def _distance(a: Sight, b: Sight) -> float:
     turn = abs(cmath.phase(cmath.exp(1j * (a.angle - b.angle))))  # numpy takes ten times as long
     return float(abs(a.centre - b.centre) + turn * a.reach)
 

@@ -91,7 +91,7 @@ class Bent:
 
     lens: Lens
     sigma: Array
-    found: bool  # else no lens is clearly better than none
+    is_significant: bool  # else no lens is clearly better than none
 
 
 UNBENT = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0])

@@ -269,12 +269,12 @@ class ClickSession:
             return "Marks need to know where the disk's centre is: click its edge, or the centre."
         if len(rim) == 2:
             return "Two points fix no circle: click a third one on the edge."
-        found = self.edge
-        if len(rim) > 2 and found is None:
+        edge = self.edge
+        if len(rim) > 2 and edge is None:
             return "These points fix no circle: take some back (Backspace) and click further round the edge."
-        if found is not None:
-            away = max(abs(m.centre - found.centre) for m in self.answers.marks)
-            if away > OUTSIDE * found.radius:
+        if edge is not None:
+            away = max(abs(m.centre - edge.centre) for m in self.answers.marks)
+            if away > OUTSIDE * edge.radius:
                 return "A mark lies outside the edge that is clicked: take a point back (Backspace)."
         if self._size() is None:
             return "The centre alone does not say how large the disk is: click its edge at two more places."
@@ -316,13 +316,13 @@ class ClickSession:
         return rim.radius / radius, rim.radius_sigma / radius
 
 
-def check(known: Mapping[str, Any], distance: float | None) -> None:
+def check(settings: Mapping[str, Any], distance: float | None) -> None:
     """Refuse what has no use for clicks, or says the scale twice."""
-    if known.get("bob") is not None:
+    if settings.get("bob") is not None:
         raise TrackError(
             "clicks are for a disk's film: of a pendulum the bob's colour and its length are enough"
         )
-    if distance is not None and known.get("scale") is not None:
+    if distance is not None and settings.get("scale") is not None:
         raise TrackError("distance and scale both say how large a pixel is: say one of them")
 
 

@@ -107,7 +107,7 @@ def locate(
     if fewer than two marks were seen; and the step's size in pixels.
     """
     numbers = [look.psf, look.noise, gain_slack, look.rim, FAINT * float(look.light[-1])]
-    at, found, used, step, moved = _core.align_marks(
+    at, sightings, used, step, moved = _core.align_marks(
         Picture(y, view, look.even),
         Appearing(look.lights, (*numbers, look.readout / y.shape[0]), look.table, look.lens.row),
         (pose.centre.real, pose.centre.imag, pose.angle),
@@ -116,7 +116,7 @@ def locate(
         without,
         keep,
     )
-    return at, [None if s is None else _sighting(*s) for s in found], used, step, moved
+    return at, [None if s is None else _sighting(*s) for s in sightings], used, step, moved
 
 
 def _sighting(

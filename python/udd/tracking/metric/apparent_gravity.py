@@ -44,7 +44,7 @@ class ApparentGravity:
         return float(np.angle(1j * self.value))
 
     @property
-    def known(self) -> bool:
+    def is_known(self) -> bool:
         """Whether the motion determines it to a fifth."""
         return bool(np.isfinite(self.sigma) and self.sigma < 0.2 * abs(self.value))
 

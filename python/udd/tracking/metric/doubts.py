@@ -20,7 +20,7 @@ def quarter_turns(gravity: ApparentGravity | None, camera: Camera) -> int:
     Gravity says which way is down; the drive, which goes upward, if gravity is not known.
     """
     by_drive = _turns_of(float(np.angle(-1j * camera.drive))) if _driven(camera) else None
-    if gravity is not None and gravity.known:
+    if gravity is not None and gravity.is_known:
         by_gravity = _turns_of(gravity.lean)
         return by_gravity if by_gravity is not None and by_drive in (None, by_gravity) else 0
     return by_drive or 0
@@ -62,7 +62,7 @@ def doubts(gravity: ApparentGravity | None, camera: Camera, fps: float, turns: i
         said.append(
             f"beta may be whole turns off after {gaps} in which the disk turned unseen: see the flags"
         )
-    if gravity is not None and gravity.known:
+    if gravity is not None and gravity.is_known:
         said += _by_gravity(gravity, camera, fps)
     elif _driven(camera) and _turns_of(float(np.angle(-1j * camera.drive))) != 0:
         said.append("the drive does not go upward in the picture: is the film turned?")

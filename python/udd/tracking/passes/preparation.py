@@ -143,7 +143,7 @@ def lens_estimates(bent: Bent, lens: Lens, wanted: Calibrate) -> dict[str, Estim
     """Lens and tilt as rows of the table."""
     names = ("lens", "tilt across", "tilt upward", "aspect", "shear")
     values = (lens.curve, lens.tilt_u, lens.tilt_v, lens.aspect, lens.shear)
-    how = "found" if bent.found else "none found"
+    how = "found" if bent.is_significant else "none found"
     items = ("lens", *["tilt"] * 4)
     return {
         name: wanted.estimate(item, value, float(sigma), how)

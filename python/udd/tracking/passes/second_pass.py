@@ -161,7 +161,7 @@ class LocalMotion:
         self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
-    def _near(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
+    def _neighbours(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
         """The nearest frames on both sides, how many intervals off, and whether k is tracked."""
         place = int(np.searchsorted(self.good, k))
         tracked = place < len(self.good) and bool(self.good[place] == k)
@@ -172,7 +172,7 @@ class LocalMotion:
 
     def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
         """Return how centre and angle differ from the neighbours' prediction; 0 if these are too few."""
-        rows, x, _ = self._near(k)
+        rows, x, _ = self._neighbours(k)
         others = rows != k
         if others.all() or others.sum() < 2:
             return 0j, 0.0
@@ -183,14 +183,14 @@ class LocalMotion:
 
     def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
         """Frames that tell the second derivative at a frame that is tracked, and their weights [1 / s^2]."""
-        rows, x, tracked = self._near(k)
+        rows, x, tracked = self._neighbours(k)
         if len(rows) < 3 or not tracked:
             return np.array([k]), np.zeros(1)
         return rows, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
 
     def at(self, k: int) -> Local | None:
         """Polynomials through the nearest poses on both sides; None where too few are near."""
-        rows, x, tracked = self._near(k)
+        rows, x, tracked = self._neighbours(k)
         if len(rows) < 3 or (not tracked and not (x.min() < 0 < x.max())):
             return None
         powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]

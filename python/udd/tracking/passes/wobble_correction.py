@@ -105,9 +105,9 @@ def correct_wobble(
     chi2, residuals = tracks.chi2.copy(), tracks.residuals.copy()
     sigma, answer = np.zeros(n), np.zeros((n, 3))
     for k, f in frames.items():
-        change, flat, more, precise = further(k, places)
+        change, flat, step, precise = further(k, places)
         left, used = flat.reshape(-1, 2), np.isfinite(tracks.chi2[k])
-        short[k] += more
+        short[k] += step
         sigma[k], answer[k] = precise**-0.5, f.response(f.across(across))[0]
         centre[k] -= complex(change[0], change[1])
         angle[k] -= float(change[2])
