@@ -21,7 +21,7 @@ KEPT = {
     "track.more",
 }
 #: Packages whose names are not renamed yet. A package leaves this list and never enters it.
-PENDING = {"app", "attractors", "bifurcations", "chaos", "cli", "plot", "report", "sweeps"}
+PENDING = {"app", "bifurcations", "cli", "plot", "report"}
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef
 Node = ast.AST
 

@@ -28,7 +28,7 @@ def test_a_quantity_gives_what_it_lists(quantity: str) -> None:
     variables, found = _found(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 1)
     assert set(found) == {v.name for v in variables} | {"outcome"}
     for variable in variables:
-        assert found[variable.name].shape == (3, *(length for _, length in variable.more))
+        assert found[variable.name].shape == (3, *(length for _, length in variable.dimensions))
         assert found[variable.name].dtype == np.dtype(variable.dtype)
         assert np.isfinite(found[variable.name]).all()
     assert (found["outcome"] == FINISHED).all()

@@ -79,16 +79,16 @@ class Attractor:
         return np.asarray(within & (met > _SPREAD * most))
 
 
-def alike(one: Attractor, other: Attractor, tight: Tightness) -> bool:
+def alike(first: Attractor, other: Attractor, tight: Tightness) -> bool:
     """Return True if two records lie on the same attractor."""
-    if one.kind != other.kind and "aperiodic" in (one.kind, other.kind):
+    if first.kind != other.kind and "aperiodic" in (first.kind, other.kind):
         # Chaos in bands so narrow that they look like points.
-        periodic, bands = (other, one) if one.kind == "aperiodic" else (one, other)
+        periodic, bands = (other, first) if first.kind == "aperiodic" else (first, other)
         return bool(periodic.holds(bands.points, tight))
-    return bool(one.holds(other.points, tight) and other.holds(one.points, tight))
+    return bool(first.holds(other.points, tight) and other.holds(first.points, tight))
 
 
-def apart(one: Attractor, other: Attractor) -> float:
+def distance_between(one: Attractor, other: Attractor) -> float:
     """How far two sets of points are from each other: the mean distance to the other's nearest point."""
     there, _ = one.tree.query(other.points)
     back, _ = other.tree.query(one.points)

@@ -215,12 +215,12 @@ def _arrays(samples: InitialStates, axes: dict[str, Floats]) -> tuple[Variables,
     """The arrays and the coordinates of the result."""
     model = samples.runner.model
     shape = tuple(len(values) for values in axes.values())
-    found, number = samples.ranked()
+    attractors, number = samples.ranked()
     others = [k for k in range(1, len(ALL_OUTCOMES)) if k not in _NOT_RUN and (samples.outcome == k).any()]
-    endings = [f"attractor {k + 1}" for k in range(len(found))] + [ALL_OUTCOMES[k] for k in others]
+    endings = [f"attractor {k + 1}" for k in range(len(attractors))] + [ALL_OUTCOMES[k] for k in others]
     ends = number - 1
     for place, k in enumerate(others):
-        ends[samples.outcome == k] = len(found) + place
+        ends[samples.outcome == k] = len(attractors) + place
     run = np.where(np.isin(samples.outcome, _NOT_RUN), -1, ends).reshape(shape)
     final = np.where(np.isin(samples.outcome, [FINISHED, *_FINAL]), ends, -1).reshape(shape)
     share, error = basin_fractions(run, len(endings))
@@ -235,38 +235,42 @@ def _arrays(samples: InitialStates, axes: dict[str, Floats]) -> tuple[Variables,
         "fitted": ("stride", fine.fitted.astype(np.int8), {"long_name": "whether the exponent is from it"}),
         "uncertainty_exponent": ((), fine.exponent, {"long_name": "exponent of uncertain over stride"}),
         "uncertainty_exponent_error": ((), fine.standard_error, {"long_name": "its standard error"}),
-        **_table(samples, found),
+        **_table(samples, attractors),
     }
     coords: Variables = {
         **{name: (name, values, of_state(model, name, "at the start")) for name, values in axes.items()},
-        "number": ("number", np.arange(1, len(found) + 1, dtype=np.int32)),
+        "number": ("number", np.arange(1, len(attractors) + 1, dtype=np.int32)),
         "ending": ("ending", np.array(endings, dtype=str)),
         "stride": ("stride", fine.stride, {"long_name": "distance in steps of the grid"}),
     }
     return data, coords
 
 
-def _table(samples: InitialStates, found: list[Attractor]) -> Variables:
+def _table(samples: InitialStates, attractors: list[Attractor]) -> Variables:
     """The attractors themselves."""
     judge, model = samples.register.judge, samples.runner.model
-    mirror = np.zeros(len(found), dtype=np.int32)
-    for k in range(len(found)):
-        images = mirror_images(found, k, judge.coordinates, judge.tight)
+    mirror = np.zeros(len(attractors), dtype=np.int32)
+    for k in range(len(attractors)):
+        images = mirror_images(attractors, k, judge.coordinates, judge.tight)
         mirror[k] = images[0] + 1 if images else 0
-    longest = max((len(one.states) for one in found), default=0)
-    orbits = np.full((len(found), longest, len(model.state_names)), np.nan)
-    for k, one in enumerate(found):
-        orbits[k, : len(one.states)] = one.states
+    longest = max((len(attractor.states) for attractor in attractors), default=0)
+    orbits = np.full((len(attractors), longest, len(model.state_names)), np.nan)
+    for k, attractor in enumerate(attractors):
+        orbits[k, : len(attractor.states)] = attractor.states
     kind = of_flags("kind", KINDS)
     time = {"long_name": "duration of a period", "units": time_unit(model)}
     return {
-        "kind": ("number", np.array([KINDS.index(one.kind) for one in found], dtype=np.int8), kind),
+        "kind": (
+            "number",
+            np.array([KINDS.index(attractor.kind) for attractor in attractors], dtype=np.int8),
+            kind,
+        ),
         "period": (
             "number",
-            np.array([one.period for one in found], dtype=np.int32),
+            np.array([attractor.period for attractor in attractors], dtype=np.int32),
             {"long_name": "number of distinct section points, 0 where aperiodic"},
         ),
-        "period_time": ("number", np.array([one.duration for one in found]), time),
+        "period_time": ("number", np.array([attractor.duration for attractor in attractors]), time),
         "mirror": ("number", mirror, {"long_name": "number of the mirror image, 0 where none was met"}),
         **{
             f"orbit_{name}": (("number", "point"), orbits[:, :, k], of_state(model, name, "on the orbit"))

@@ -55,14 +55,14 @@ class InitialStates:
         rows = parameter_rows(self.runner.model, {}, len(jobs))
         judge = self.register.judge
         values = np.zeros(len(jobs))
-        found, verdicts = follow(
+        crossings, verdicts = follow(
             self.runner, judge, rows, values, self._end[jobs], skip, self._n, self._longest
         )
-        done = found.outcome != INTERRUPTED
-        place = self.register.places(found, verdicts)
+        done = crossings.outcome != INTERRUPTED
+        place = self.register.places(crossings, verdicts)
         self.place[jobs[done]] = place[done]
-        self.outcome[jobs[done]] = np.where(place >= 0, FINISHED, found.outcome)[done]
-        self._end[jobs[done]] = found.end[done]
+        self.outcome[jobs[done]] = np.where(place >= 0, FINISHED, crossings.outcome)[done]
+        self._end[jobs[done]] = crossings.end[done]
         return bool(done.all())
 
     def _confirm(self, spent: int) -> bool:
@@ -85,13 +85,13 @@ class InitialStates:
         return False
 
     def _aperiodic(self) -> NDArray[np.intp]:
-        kinds = np.array([one.kind == "aperiodic" for one in self.register.known] + [False])
+        kinds = np.array([one.kind == "aperiodic" for one in self.register.attractors] + [False])
         return np.flatnonzero(kinds[self.place])
 
     def ranked(self) -> tuple[list[Attractor], NDArray[np.int32]]:
         """The attractors, the largest basin first, and the number of each job's from 1 on."""
-        counts = np.bincount(self.place[self.place >= 0], minlength=len(self.register.known))
+        counts = np.bincount(self.place[self.place >= 0], minlength=len(self.register.attractors))
         order = np.argsort(-counts, kind="stable")[: int((counts > 0).sum())]
         number = np.zeros(len(counts) + 1, dtype=np.int32)
         number[order] = np.arange(1, len(order) + 1)
-        return [self.register.known[k] for k in order], number[self.place]
+        return [self.register.attractors[k] for k in order], number[self.place]

@@ -187,7 +187,7 @@ def bifurcation(
     rows = parameter_rows(model, {parameter: of_job}, places.size)
     runner = section_runner(model, rows, section, direction, chosen, t_max, transient + n)
     judge = MotionClassifier(model, parameter, coordinates_of(middle, begin), runner)
-    found = nothing(places.size, n, begin.shape[1])
+    crossings = nothing(places.size, n, begin.shape[1])
     verdicts = Classification.none(places.size)
 
     def work(these: NDArray[np.intp], states: Floats) -> None:
@@ -196,45 +196,45 @@ def bifurcation(
             verdicts.put(these, own)
         else:
             one = runner(rows[these], states, transient, n)
-        put(found, these, one)
+        put(crossings, these, one)
 
     with progress_bar(places.size, "run", chosen["progress"], title="bifurcation") as bar:
         added = perturbation(judge.coordinates.size, nudge)
-        stopped = run_in_order(work, found, begin, places, PATHS[path], added, transient + n, bar.update)
+        stopped = run_in_order(work, crossings, begin, places, PATHS[path], added, transient + n, bar.update)
     if not stopped:
-        each = np.minimum(found.t_end, runner.t_each * (transient + n))
+        each = np.minimum(crossings.t_end, runner.t_each * (transient + n))
         warn_of_some(model, rows, begin[:1], each, runner.rtol, runner.atol)
-    told, kinds = DiagramLabels.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
+    labels, kinds = DiagramLabels.nothing(places.size, len(axis)), np.zeros(places.size, dtype=np.int8)
     try:
         if attractors and (partial or not stopped):
-            told = tell(judge, found, verdicts, places, reach)
-        if told.differ.any() and not stopped:
-            unsure = places[:, :, told.differ].ravel()
-            unsure = unsure[decided(found, verdicts)[unsure]]
+            labels = tell(judge, crossings, verdicts, places, reach)
+        if labels.differ.any() and not stopped:
+            unsure = places[:, :, labels.differ].ravel()
+            unsure = unsure[decided(crossings, verdicts)[unsure]]
             for part in parts(len(unsure), longest + n):
-                if not again(runner, judge, rows, of_job, found, verdicts, unsure[part], longest, n):
+                if not again(runner, judge, rows, of_job, crossings, verdicts, unsure[part], longest, n):
                     raise KeyboardInterrupt
-            found.outcome[unsure[verdicts.period[unsure] == SETTLING]] = UNDECIDED
-            told = tell(judge, found, verdicts, places, reach)
+            crossings.outcome[unsure[verdicts.period[unsure] == SETTLING]] = UNDECIDED
+            labels = tell(judge, crossings, verdicts, places, reach)
         if attractors and (partial or not stopped):
-            kinds = kinds_of(runner, judge, found, verdicts, rows, of_job)
+            kinds = kinds_of(runner, judge, crossings, verdicts, rows, of_job)
     except KeyboardInterrupt:
         stopped = True
     dims = ("path", "start", parameter)
     data: Variables = {
         name: (
             (*dims, "point"),
-            found.points[:, :, k].reshape(*shape, n),
+            crossings.points[:, :, k].reshape(*shape, n),
             of_state(model, name, "on the section"),
         )
         for k, name in enumerate(model.state_names)
         if name in kept
     }
-    data["outcome"] = (dims, found.outcome.astype(np.int8).reshape(shape), of_outcomes())
+    data["outcome"] = (dims, crossings.outcome.astype(np.int8).reshape(shape), of_outcomes())
     if attractors:
-        data |= _of_attractors(model, parameter, shape, verdicts, told, kinds)
+        data |= _of_attractors(model, parameter, shape, verdicts, labels, kinds)
         if path == "both":
-            data |= _of_hysteresis(model, parameter, axis, told)
+            data |= _of_hysteresis(model, parameter, axis, labels)
     coords: Variables = {
         "path": ("path", list(PATHS[path])),
         "start": ("start", np.arange(len(begin), dtype=np.int32)),
@@ -248,7 +248,7 @@ def bifurcation(
         data, coords, of_result(runner, "bifurcation diagram", {**told_of, **more})
     )
     if stopped:
-        left = int((found.outcome == INTERRUPTED).sum())
+        left = int((crossings.outcome == INTERRUPTED).sum())
         missing = f"{left} of {places.size} runs are" if left else "telling the attractors apart is"
         interrupted(lambda: made, f"{missing} not finished: stopped by Ctrl-C", partial)
     return made
@@ -259,31 +259,31 @@ def _of_attractors(
     parameter: str,
     shape: tuple[int, ...],
     verdicts: Classification,
-    told: DiagramLabels,
+    labels: DiagramLabels,
     kinds: NDArray[np.int8],
 ) -> Variables:
     dims = ("path", "start", parameter)
-    period = np.where(told.label > 0, verdicts.period, SETTLING).astype(np.int32)
+    period = np.where(labels.label > 0, verdicts.period, SETTLING).astype(np.int32)
     time = {"long_name": "duration of a period", "units": time_unit(model)}
     return {
         "kind": (dims, kinds.reshape(shape), of_flags("kind of motion", MOTIONS)),
         "period": (dims, period.reshape(shape), {"long_name": "number of distinct section points"}),
-        "period_time": (dims, told.duration.reshape(shape), time),
-        "attractor": (dims, told.label.reshape(shape), {"long_name": "label of the attractor"}),
+        "period_time": (dims, labels.duration.reshape(shape), time),
+        "attractor": (dims, labels.label.reshape(shape), {"long_name": "label of the attractor"}),
         "symmetric": (
             dims,
-            told.symmetric.reshape(shape),
+            labels.symmetric.reshape(shape),
             {"long_name": "whether it is its own mirror image"},
         ),
     }
 
 
-def _of_hysteresis(model: Model, parameter: str, axis: Floats, told: DiagramLabels) -> Variables:
+def _of_hysteresis(model: Model, parameter: str, axis: Floats, labels: DiagramLabels) -> Variables:
     words = {"long_name": "whether the ways up and down end on different attractors"}
     edges = {**of_parameter(model, parameter), "long_name": f"first and last {parameter} with hysteresis"}
     return {
-        "hysteresis": (parameter, told.differ.astype(np.int8), words),
-        "hysteresis_interval": (("interval", "edge"), intervals(told.differ, told.unknown, axis), edges),
+        "hysteresis": (parameter, labels.differ.astype(np.int8), words),
+        "hysteresis_interval": (("interval", "edge"), intervals(labels.differ, labels.unknown, axis), edges),
     }
 
 

@@ -17,39 +17,43 @@ class AttractorCatalogue:
     """Attractors in the order in which they were met."""
 
     judge: MotionClassifier
-    known: list[Attractor] = field(default_factory=list)
+    attractors: list[Attractor] = field(default_factory=list)
 
-    def places(self, found: Crossings, verdicts: Classification) -> NDArray[np.int32]:
+    def places(self, crossings: Crossings, verdicts: Classification) -> NDArray[np.int32]:
         """The place of each job's attractor, -1 where there is none. New ones are added."""
-        result = np.full(len(found.outcome), -1, dtype=np.int32)
-        known = decided(found, verdicts)
+        result = np.full(len(crossings.outcome), -1, dtype=np.int32)
+        known = decided(crossings, verdicts)
         for period in np.unique(verdicts.period[known]).tolist():
             for rest in (False, True):
                 jobs = np.flatnonzero(known & (verdicts.period == period) & (verdicts.rest == rest))
                 if len(jobs):
-                    self._place(found, verdicts, jobs, result)
+                    self._place(crossings, verdicts, jobs, result)
         return result
 
     def _place(
-        self, found: Crossings, verdicts: Classification, jobs: NDArray[np.intp], result: NDArray[np.int32]
+        self,
+        crossings: Crossings,
+        verdicts: Classification,
+        jobs: NDArray[np.intp],
+        result: NDArray[np.int32],
     ) -> None:
         """Jobs of one kind and period: with those that are known, then one new one after the other."""
-        first = self.judge.attractor(found, verdicts, int(jobs[0]))
+        first = self.judge.attractor(crossings, verdicts, int(jobs[0]))
         if first.kind == "equilibrium":
-            ends = [self.judge.attractor(found, verdicts, int(job)).points for job in jobs]
+            ends = [self.judge.attractor(crossings, verdicts, int(job)).points for job in jobs]
             points = np.stack(ends)
         else:
-            n = found.points.shape[1]
-            points = self.judge.coordinates(found.points[jobs][:, n - (first.period or n) :])
-        for place, attractor in enumerate(self.known):
+            n = crossings.points.shape[1]
+            points = self.judge.coordinates(crossings.points[jobs][:, n - (first.period or n) :])
+        for place, attractor in enumerate(self.attractors):
             if (attractor.kind, attractor.period) == (first.kind, first.period):
                 open_ = np.flatnonzero(result[jobs] < 0)
                 if not len(open_):
                     return
                 result[jobs[open_[attractor.holds(points[open_], self.judge.tight)]]] = place
         while len(open_ := np.flatnonzero(result[jobs] < 0)):
-            new = self.judge.attractor(found, verdicts, int(jobs[open_[0]]))
-            self.known.append(new)
+            new = self.judge.attractor(crossings, verdicts, int(jobs[open_[0]]))
+            self.attractors.append(new)
             on = new.holds(points[open_], self.judge.tight)
             on[0] = True
-            result[jobs[open_[on]]] = len(self.known) - 1
+            result[jobs[open_[on]]] = len(self.attractors) - 1

@@ -33,18 +33,18 @@ class MotionClassifier:
         """How well points must agree."""
         return tightness(self.runner.rtol)
 
-    def __call__(self, found: Crossings, values: Floats) -> Classification:
+    def __call__(self, crossings: Crossings, values: Floats) -> Classification:
         """The verdict on each job; `values` (jobs,) are those of the parameter that varies."""
-        jobs = len(found.points)
-        whole = np.flatnonzero(found.outcome == FINISHED)
+        jobs = len(crossings.points)
+        whole = np.flatnonzero(crossings.outcome == FINISHED)
         period = np.full(jobs, APERIODIC, dtype=np.int32)
-        period[whole] = periods(self.coordinates(found.points[whole]), self.tight)
+        period[whole] = periods(self.coordinates(crossings.points[whole]), self.tight)
         rest = np.zeros(jobs, dtype=bool)
         # An equilibrium lies on the section, or the motion never gets there.
-        crossed = np.flatnonzero((period == 1) & (found.outcome == FINISHED))
+        crossed = np.flatnonzero((period == 1) & (crossings.outcome == FINISHED))
         for rows, states in (
-            (crossed, found.points[:, -1]),
-            (np.flatnonzero(found.outcome == OUT_OF_TIME), found.end),
+            (crossed, crossings.points[:, -1]),
+            (np.flatnonzero(crossings.outcome == OUT_OF_TIME), crossings.end),
         ):
             for value in np.unique(values[rows]):
                 here = rows[values[rows] == value]
@@ -62,14 +62,14 @@ class MotionClassifier:
         kept = np.flatnonzero(np.isfinite(self.coordinates.size))
         test = rest_test(self.runner, model, self.coordinates)
         rest, passes = np.zeros((2, len(states)), dtype=bool)
-        known: list[Floats] = []
+        equilibria: list[Floats] = []
         for k, state in enumerate(states):
             place = self.coordinates(state)
-            if any(np.abs(place - other).max(initial=0.0) < self.tight.same for other in known):
+            if any(np.abs(place - other).max(initial=0.0) < self.tight.same for other in equilibria):
                 rest[k] = True
             elif test(state, attracts=self.parameter is None) is not None:
                 rest[k] = True
-                known.append(place)
+                equilibria.append(place)
             elif (near := equilibrium_near(model, state, kept, 0.0)) is not None:
                 there = state.copy()
                 there[kept] = near.state
@@ -81,18 +81,18 @@ class MotionClassifier:
         """The model with a value of the parameter."""
         return self.model if self.parameter is None else self.model.with_parameters({self.parameter: value})
 
-    def attractor(self, found: Crossings, verdicts: Classification, job: int) -> Attractor:
+    def attractor(self, crossings: Crossings, verdicts: Classification, job: int) -> Attractor:
         """Return the attractor on which a job with a verdict ended."""
         period = int(verdicts.period[job])
         if verdicts.rest[job]:
-            last = found.points[job, -1]
-            states = (last if np.isfinite(last).all() else found.end[job])[None]
+            last = crossings.points[job, -1]
+            states = (last if np.isfinite(last).all() else crossings.end[job])[None]
             return Attractor("equilibrium", states, self.coordinates(states))
         if period == APERIODIC:
-            states = found.points[job].copy()
+            states = crossings.points[job].copy()
             return Attractor("aperiodic", states, self.coordinates(states))
-        states = found.points[job, -period:].copy()
-        t = found.t[job]
+        states = crossings.points[job, -period:].copy()
+        t = crossings.t[job]
         return Attractor("periodic", states, self.coordinates(states), float(t[-1] - t[-1 - period]))
 
 
@@ -151,18 +151,18 @@ def follow(
 
     A job that is still not clear has the outcome "undecided".
     """
-    found = runner(rows, starts, transient, n)
-    verdicts = judge(found, values)
+    crossings = runner(rows, starts, transient, n)
+    verdicts = judge(crossings, values)
     spent = transient + n
-    while len(open_ := np.flatnonzero(followed_on(found, verdicts))):
-        stopped = (found.outcome == INTERRUPTED).any()
+    while len(open_ := np.flatnonzero(followed_on(crossings, verdicts))):
+        stopped = (crossings.outcome == INTERRUPTED).any()
         if 2 * spent + n > longest and not stopped:
-            found.outcome[open_] = UNDECIDED
-        elif stopped or not again(runner, judge, rows, values, found, verdicts, open_, spent, n):
+            crossings.outcome[open_] = UNDECIDED
+        elif stopped or not again(runner, judge, rows, values, crossings, verdicts, open_, spent, n):
             still = open_[verdicts.period[open_] == SETTLING]
-            found.outcome[still], found.points[still] = INTERRUPTED, np.nan
+            crossings.outcome[still], crossings.points[still] = INTERRUPTED, np.nan
         spent += spent + n
-    return found, verdicts
+    return crossings, verdicts
 
 
 def again(
@@ -170,15 +170,15 @@ def again(
     judge: MotionClassifier,
     rows: Floats,
     values: Floats,
-    found: Crossings,
+    crossings: Crossings,
     verdicts: Classification,
     jobs: NDArray[np.intp],
     skip: int,
     n: int,
 ) -> bool:
     """Follow some jobs on from where they are; whether all were finished. Others stay as they were."""
-    more = runner(rows[jobs], found.end[jobs], skip, n)
+    more = runner(rows[jobs], crossings.end[jobs], skip, n)
     done = more.outcome != INTERRUPTED
-    put(found, jobs[done], more.only(done))
+    put(crossings, jobs[done], more.only(done))
     verdicts.put(jobs[done], judge(more, values[jobs]).only(done))
     return bool(done.all())

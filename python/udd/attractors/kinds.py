@@ -30,7 +30,7 @@ _TURNS = 1e-6  # typical sizes per typical time: what is slower does not turn
 def kinds_of(
     runner: SectionRunner,
     judge: MotionClassifier,
-    found: Crossings,
+    crossings: Crossings,
     verdicts: Classification,
     rows: Floats,
     values: Floats,
@@ -41,13 +41,13 @@ def kinds_of(
     neither grow nor shrink, and a cycle (of more rounds than can be counted) if one direction does.
     """
     kind = np.zeros(len(values), dtype=np.int8)
-    known = decided(found, verdicts)
-    kind[np.isin(found.outcome, _LEFT)] = MOTIONS.index("left")
+    known = decided(crossings, verdicts)
+    kind[np.isin(crossings.outcome, _LEFT)] = MOTIONS.index("left")
     kind[known & (verdicts.period > 0)] = MOTIONS.index("cycle")
     kind[known & (verdicts.period == APERIODIC)] = MOTIONS.index("aperiodic")
     rest = np.flatnonzero(known & verdicts.rest)
     for job in rest.tolist():
-        state = judge.attractor(found, verdicts, job).states[0]
+        state = judge.attractor(crossings, verdicts, job).states[0]
         turns = _turns(judge, state, float(values[job]))
         kind[job] = MOTIONS.index("rotating state" if turns else "equilibrium")
     free = int((~np.isfinite(judge.coordinates.size)).sum())
@@ -55,8 +55,8 @@ def kinds_of(
         open_ = np.flatnonzero(kind == MOTIONS.index("aperiodic"))
         if not len(open_):
             break
-        time = share * float(np.nanmedian(np.ptp(found.t[open_], axis=1)))
-        values, starts = np.ascontiguousarray(rows[open_]), np.ascontiguousarray(found.end[open_])
+        time = share * float(np.nanmedian(np.ptp(crossings.t[open_], axis=1)))
+        values, starts = np.ascontiguousarray(rows[open_]), np.ascontiguousarray(crossings.end[open_])
         limits = runner.rtol, runner.atol, runner.threads, None, runner.max_step
         batch = Batch(runner.model, values, starts, *limits)
         got = _core.lyapunov(batch, True, time, 0.0, 1e-300)

@@ -53,40 +53,40 @@ class DiagramLabels:
 
 def tell(
     judge: MotionClassifier,
-    found: Crossings,
+    crossings: Crossings,
     verdicts: Classification,
     places: NDArray[np.intp],
     reach: float,
 ) -> DiagramLabels:
     """Tell the attractors apart, value by value; `places` (paths, starts, values) numbers the jobs."""
-    told = DiagramLabels.nothing(places.size, places.shape[2])
-    known = decided(found, verdicts)
+    diagram_labels = DiagramLabels.nothing(places.size, places.shape[2])
+    known = decided(crossings, verdicts)
     tracks = AttractorMatcher(reach)
     for k in range(places.shape[2]):
         here = [job for job in places[:, :, k].ravel().tolist() if known[job]]
-        seen = [judge.attractor(found, verdicts, job) for job in here]
+        seen = [judge.attractor(crossings, verdicts, job) for job in here]
         first = groups(seen, judge.tight)
         distinct = sorted(set(first))
         labels = dict(zip(distinct, tracks.label([seen[j] for j in distinct]), strict=True))
         for job, attractor, j in zip(here, seen, first, strict=True):
-            told.label[job] = labels[j]
-            told.duration[job] = attractor.duration
-        family = _families(judge, seen, distinct, told, here, first)
-        told.unknown[k] = len(here) < places[:, :, k].size
+            diagram_labels.label[job] = labels[j]
+            diagram_labels.duration[job] = attractor.duration
+        family = _families(judge, seen, distinct, diagram_labels, here, first)
+        diagram_labels.unknown[k] = len(here) < places[:, :, k].size
         if places.shape[0] == 2:
             of_job = {job: family[j] for job, j in zip(here, first, strict=True)}
             pairs = places[:, :, k].T.tolist()
-            told.differ[k] = any(
+            diagram_labels.differ[k] = any(
                 up in of_job and down in of_job and of_job[up] != of_job[down] for up, down in pairs
             )
-    return told
+    return diagram_labels
 
 
 def _families(
     judge: MotionClassifier,
     seen: list[Attractor],
     distinct: list[int],
-    told: DiagramLabels,
+    labels: DiagramLabels,
     here: list[int],
     first: list[int],
 ) -> dict[int, int]:
@@ -95,11 +95,11 @@ def _families(
     if not judge.coordinates.mirrors:
         return {j: j for j in distinct}
     some = [seen[j] for j in distinct]
-    own = {}
+    partners = {}
     for place, j in enumerate(distinct):
         images = mirror_images(some, place, judge.coordinates, judge.tight)
-        own[j] = place in images
+        partners[j] = place in images
         family[j] = min(family.get(distinct[i], distinct[i]) for i in (place, *images))
     for job, j in zip(here, first, strict=True):
-        told.symmetric[job] = own[j]
+        labels.symmetric[job] = partners[j]
     return family

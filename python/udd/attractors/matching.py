@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from udd.chaos.recurrence import Tightness
 from udd.models.state_scaling import Coordinates, Floats
 
-from .attractor import Attractor, alike, apart, mirrored
+from .attractor import Attractor, alike, distance_between, mirrored
 
 
 def groups(found: list[Attractor], tight: Tightness) -> list[int]:
@@ -39,20 +39,22 @@ class AttractorMatcher:
     reach: float
     last: dict[int, Attractor] = field(default_factory=dict)
 
-    def label(self, found: list[Attractor]) -> list[int]:
+    def label(self, attractors: list[Attractor]) -> list[int]:
         """The labels of the distinct attractors at the next value."""
         from scipy.optimize import linear_sum_assignment
 
-        known = list(self.last)
-        labels = [0] * len(found)
-        if known and found:
-            cost = np.array([[apart(self.last[label], one) for label in known] for one in found])
+        last_attractors = list(self.last)
+        labels = [0] * len(attractors)
+        if last_attractors and attractors:
+            cost = np.array(
+                [[distance_between(self.last[label], one) for label in last_attractors] for one in attractors]
+            )
             for k, j in zip(*linear_sum_assignment(np.minimum(cost, 1e3 * self.reach)), strict=True):
                 if cost[k, j] <= self.reach:
-                    labels[k] = known[j]
+                    labels[k] = last_attractors[j]
         for k, label in enumerate(labels):
             labels[k] = label or len(self.last) + 1
-            self.last[labels[k]] = found[k]
+            self.last[labels[k]] = attractors[k]
         return labels
 
 

@@ -43,19 +43,19 @@ def sized_by_motion(
     if model.profile.dynamics.sizes is not None:
         return coordinates, False
     some = np.unique(np.linspace(0, len(starts) - 1, min(_PILOTS, len(starts))).astype(int))
-    found = runner(np.tile(row, (len(some), 1)), starts[some], transient, n)
-    stopped = bool((found.outcome == INTERRUPTED).any())
+    crossings = runner(np.tile(row, (len(some), 1)), starts[some], transient, n)
+    stopped = bool((crossings.outcome == INTERRUPTED).any())
     if not stopped:
-        warn_of_some(model, row[None], starts[some], found.t_end, runner.rtol, runner.atol)
+        warn_of_some(model, row[None], starts[some], crossings.t_end, runner.rtol, runner.atol)
     rests = rest_test(runner, model, coordinates)
     range_, way = np.zeros((2, starts.shape[1]))
-    for job in np.flatnonzero(np.isin(found.outcome, (FINISHED, OUT_OF_TIME))):
-        if found.outcome[job] == FINISHED and rests(found.points[job, -1]) is None:
-            span = float(found.t[job, -1] - found.t[job, -1 - min(_RETURNS, n - 1)])
-            range_ = np.maximum(range_, _range(runner, found.points[job, -1], span))
+    for job in np.flatnonzero(np.isin(crossings.outcome, (FINISHED, OUT_OF_TIME))):
+        if crossings.outcome[job] == FINISHED and rests(crossings.points[job, -1]) is None:
+            span = float(crossings.t[job, -1] - crossings.t[job, -1 - min(_RETURNS, n - 1)])
+            range_ = np.maximum(range_, _range(runner, crossings.points[job, -1], span))
         else:
             # An equilibrium is moved by errors alone.
-            way = np.maximum(way, _range(runner, starts[some[job]], float(found.t_end[job])))
+            way = np.maximum(way, _range(runner, starts[some[job]], float(crossings.t_end[job])))
     between = np.ptp(starts, axis=0)
     noise = 100.0 * (runner.atol + runner.rtol * np.abs(starts).max(axis=0))
     size = coordinates.size

@@ -75,7 +75,7 @@ class SectionRunner:
         require_memory(
             f"{count} points of each of {jobs} runs", jobs, count, starts.shape[1] + 1, itemsize=16
         )
-        found = Crossings(
+        crossings = Crossings(
             np.full((jobs, count, starts.shape[1]), np.nan),
             np.full((jobs, count), np.nan),
             np.full(jobs, START_OUTSIDE, dtype=np.uint8),
@@ -89,11 +89,15 @@ class SectionRunner:
             surfaces = list(zip(self.section, self.direction, strict=True))
             got = _core.sections(batch, surfaces, skip, count, self.t_each * (skip + count))
             columns = got["t"].shape[1]  # fewer after Ctrl-C
-            found.points[runs, :columns], found.t[runs, :columns] = got["points"], got["t"]
-            found.outcome[runs], found.end[runs], found.t_end[runs] = got["outcome"], got["end"], got["t_end"]
-            cut = found.outcome == INTERRUPTED
-            found.points[cut], found.t[cut] = np.nan, np.nan
-        return found
+            crossings.points[runs, :columns], crossings.t[runs, :columns] = got["points"], got["t"]
+            crossings.outcome[runs], crossings.end[runs], crossings.t_end[runs] = (
+                got["outcome"],
+                got["end"],
+                got["t_end"],
+            )
+            cut = crossings.outcome == INTERRUPTED
+            crossings.points[cut], crossings.t[cut] = np.nan, np.nan
+        return crossings
 
 
 def parts(jobs: int, each: int) -> Iterator[slice]:

@@ -40,7 +40,7 @@ def perturbation(size: Floats, nudge: float) -> Floats:
 
 def run_in_order(
     work: Callable[[NDArray[np.intp], Floats], None],
-    found: Crossings,
+    crossings: Crossings,
     begin: Floats,
     places: NDArray[np.intp],
     names: tuple[str, ...],
@@ -53,8 +53,8 @@ def run_in_order(
     Parameters
     ----------
     work : callable
-        Takes jobs and their initial states, and fills `found`.
-    found : Crossings
+        Takes jobs and their initial states, and fills `crossings`.
+    crossings : Crossings
     begin : ndarray (starts, dim)
     places : ndarray (paths, starts, values)
         The number of each job.
@@ -75,7 +75,7 @@ def run_in_order(
             for these, own in steps:
                 work(these, own)
                 tell(len(these))
-                if (found.outcome[these] == INTERRUPTED).any():
+                if (crossings.outcome[these] == INTERRUPTED).any():
                     return True
             return False
         for k in range(values):
@@ -83,10 +83,10 @@ def run_in_order(
             these = np.concatenate([places[i, :, c] for i, c in enumerate(columns)])
             work(these, states)
             tell(len(these))
-            if (found.outcome[these] == INTERRUPTED).any():
+            if (crossings.outcome[these] == INTERRUPTED).any():
                 return True
-            end = found.end[these]
-            goes_on = np.isin(found.outcome[these], _GOES_ON) & np.isfinite(end).all(axis=1)
+            end = crossings.end[these]
+            goes_on = np.isin(crossings.outcome[these], _GOES_ON) & np.isfinite(end).all(axis=1)
             states = np.where(goes_on[:, None], end + added, np.tile(begin, (len(names), 1)))
         return False
     except KeyboardInterrupt:

@@ -168,12 +168,12 @@ def lyapunov(
     >>> udd.lyapunov(disk, parameters={"W": [0.055, 0.06], "k0": [[0.012], [0.013]]}, tol=0.2).shape
     (2, 2)
     """
-    model, own = (w, {}) if isinstance(w, Model) else (DLE(1.0), {"w": w})
-    for name in own.keys() & (parameters or {}).keys():
+    model, swept = (w, {}) if isinstance(w, Model) else (DLE(1.0), {"w": w})
+    for name in swept.keys() & (parameters or {}).keys():
         raise ModelError(f"{name} is given twice, also among the parameters")
-    orbits = parameter_batch(model, {**own, **(parameters or {})})
+    orbits = parameter_batch(model, {**swept, **(parameters or {})})
     n, shape = len(orbits), orbits.shape
-    for drives in (orbits.values[name] for name in own if n):
+    for drives in (orbits.values[name] for name in swept if n):
         DLE(float(drives.min()))  # refuses what is negative
     time_scale = model.time_scale
     time, skipped = span(t, transient, longest=1e5 * time_scale, skip=400.0 * time_scale)
@@ -191,22 +191,22 @@ def lyapunov(
             part = slice(first, min(first + PORTION, n))
             rows = orbits.rows(part)
             batch = Batch(model, rows, start[None, :], rtol, atol, workers, bar.since(first), longest)
-            found = _core.lyapunov(batch, False, time, skipped, goal)
+            raw = _core.lyapunov(batch, False, time, skipped, goal)
             if first == 0:
-                warn_of_some(model, rows, found["end"], min(time, LOOK * time_scale), rtol, atol)
-            done = found["outcome"] == FINISHED
-            exponents[part] = np.where(done, found["value"][:, 0], np.nan)
+                warn_of_some(model, rows, raw["end"], min(time, LOOK * time_scale), rtol, atol)
+            done = raw["outcome"] == FINISHED
+            exponents[part] = np.where(done, raw["value"][:, 0], np.nan)
             if with_error:
-                errors[part] = np.where(done, found["standard_error"][:, 0], np.nan)
-            error = np.nan_to_num(found["standard_error"][:, 0], nan=np.inf)  # too short for blocks
+                errors[part] = np.where(done, raw["standard_error"][:, 0], np.nan)
+            error = np.nan_to_num(raw["standard_error"][:, 0], nan=np.inf)  # too short for blocks
             short = done & (error > goal)
             if short.any():
                 missed += int(short.sum())
                 worst = max(worst, float(error[short].max()))
             if not done.all():
-                outcomes += found["outcome"][~done].tolist()
+                outcomes += raw["outcome"][~done].tolist()
     if outcomes:
-        _tell(outcomes, n, shape == (), found["failure"])
+        _tell(outcomes, n, shape == (), raw["failure"])
     if missed:
         which = "the exponent has" if shape == () else f"{missed} of {n} exponents have"
         warnings.warn(

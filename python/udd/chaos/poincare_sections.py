@@ -331,43 +331,43 @@ def poincare(
     jobs = max(len(rows), len(starts))
     with progress_bar(jobs, "orbit", chosen["progress"]) as bar:
         batch = Batch(model, rows, starts, rtol, atol, thread_count(chosen["threads"]), bar.since(), longest)
-        found = _core.sections(batch, list(zip(surfaces, ways, strict=True)), skipped, count, end)
-    names = np.array(OUTCOMES)[found["outcome"]]
-    numbers = found["found"].astype(np.int64)
-    columns = found["t"].shape[1]  # as many as were asked for, or were found until Ctrl-C
-    which = np.where(np.arange(columns) < numbers[:, None], found["which"].astype(np.int64), -1)
+        raw = _core.sections(batch, list(zip(surfaces, ways, strict=True)), skipped, count, end)
+    names = np.array(OUTCOMES)[raw["outcome"]]
+    numbers = raw["found"].astype(np.int64)
+    columns = raw["t"].shape[1]  # as many as were asked for, or were found until Ctrl-C
+    which = np.where(np.arange(columns) < numbers[:, None], raw["which"].astype(np.int64), -1)
     words = tuple(next(word for word, sign in _DIRECTIONS.items() if sign == way) for way in ways)
     if shape == ():
-        own = int(numbers[0])
+        single = int(numbers[0])
         made = Section(
-            found["t"][0, :own],
-            found["points"][0, :own],
-            which[0, :own],
+            raw["t"][0, :single],
+            raw["points"][0, :single],
+            which[0, :single],
             surfaces,
             words,
-            own,
-            float(found["residual"][0]),
+            single,
+            float(raw["residual"][0]),
             str(names[0]),
-            found["end"][0],
-            float(found["t_end"][0]),
+            raw["end"][0],
+            float(raw["t_end"][0]),
             model,
         )
     else:
         made = Section(
-            found["t"].reshape(*shape, columns),
-            found["points"].reshape(*shape, columns, len(model.state_names)),
+            raw["t"].reshape(*shape, columns),
+            raw["points"].reshape(*shape, columns, len(model.state_names)),
             which.reshape(*shape, columns),
             surfaces,
             words,
             numbers.reshape(shape),
-            found["residual"].reshape(shape),
+            raw["residual"].reshape(shape),
             names.reshape(shape),
-            found["end"].reshape(*shape, -1),
-            found["t_end"].reshape(shape),
+            raw["end"].reshape(*shape, -1),
+            raw["t_end"].reshape(shape),
             model,
         )
-    _tell(found["outcome"], numbers, count, made, chosen["partial"])
-    warn_of_some(model, rows, starts, found["t_end"], rtol, atol)
+    _tell(raw["outcome"], numbers, count, made, chosen["partial"])
+    warn_of_some(model, rows, starts, raw["t_end"], rtol, atol)
     return made
 
 
@@ -435,7 +435,9 @@ def _hint(section: Section) -> str:
     return ""
 
 
-def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Section, partial: bool) -> None:
+def _tell(
+    outcome: NDArray[np.uint8], achieved: NDArray[Any], n: int, section: Section, partial: bool
+) -> None:
     """Warn of orbits with fewer points."""
     short = outcome != OUTCOMES.index("finished")
     if not short.any():
@@ -443,7 +445,7 @@ def _tell(outcome: NDArray[np.uint8], found: NDArray[Any], n: int, section: Sect
     kinds, counts = np.unique(outcome[short], return_counts=True)
     if len(outcome) == 1:
         message = (
-            f"the orbit has {int(found[0])} crossings instead of {n}: {OUTCOMES[kinds[0]]}{_hint(section)}"
+            f"the orbit has {int(achieved[0])} crossings instead of {n}: {OUTCOMES[kinds[0]]}{_hint(section)}"
         )
     else:
         whys = ", ".join(f"{OUTCOMES[kind]} {count}" for kind, count in zip(kinds, counts, strict=True))

@@ -215,28 +215,28 @@ def lyapunov_spectrum(
     run = _Run(model, rtol, atol, longest_step(max_step, time))
     if section is not None:
         run.refuse(section, start)
-    found, fate = run.look(start, time, skipped, goal)
-    spent, finer = float(found["time"][0]), goal
-    while not (fate.ordered or _positive(found, time_scale)) and spent < time:
+    orbits, fate = run.look(start, time, skipped, goal)
+    spent, finer = float(orbits["time"][0]), goal
+    while not (fate.ordered or _positive(orbits, time_scale)) and spent < time:
         # Neither order nor chaos yet: on from here, for longer.
         finer /= 2.0
-        found, fate = run.look(found["end"][0], time - spent, 0.0, finer)
-        spent += float(found["time"][0])
+        orbits, fate = run.look(orbits["end"][0], time - spent, 0.0, finer)
+        spent += float(orbits["time"][0])
     if not fate.ordered:
         # Chaos that has not ended may yet do so; without tangents the way there is short.
-        fate = run.fate(found["end"][0], time - spent)
+        fate = run.fate(orbits["end"][0], time - spent)
     settles = fate.kind not in ("aperiodic", "escapes")
-    other = settles and (_positive(found, time_scale) or fate.t > 0.0)
+    other = settles and (_positive(orbits, time_scale) or fate.t > 0.0)
     aside = spent + fate.t if other else 0.0
-    if settles and abs(found["value"][0, 0]) > _SIGMAS * found["standard_error"][0, 0]:
+    if settles and abs(orbits["value"][0, 0]) > _SIGMAS * orbits["standard_error"][0, 0]:
         # The averages are of the way there: once more, of what it leads to.
-        found, fate = run.look(fate.state, time, 0.0, goal)
-        if fate.kind == "settling" and _positive(found, time_scale):
+        orbits, fate = run.look(fate.state, time, 0.0, goal)
+        if fate.kind == "settling" and _positive(orbits, time_scale):
             # Neighbours diverge all the way: chaos in bands so narrow that they look like points.
             fate = replace(fate, kind="aperiodic")
         aside = aside if fate.kind not in ("aperiodic", "escapes") else 0.0
-    values, errors = found["value"][0], found["standard_error"][0]
-    verdict = _verdict(run, fate, found)
+    values, errors = orbits["value"][0], orbits["standard_error"][0]
+    verdict = _verdict(run, fate, orbits)
     settles = fate.kind == "settling" and verdict == "undecided"
     converged = bool(errors[0] <= goal) and not settles
     if settles:
@@ -254,7 +254,7 @@ def lyapunov_spectrum(
             stacklevel=2,
         )
     if fate.kind not in ("equilibrium", "escapes"):
-        warn_from(model, found["end"][0], 0.0, min(time, LOOK * time_scale), rtol, atol)
+        warn_from(model, orbits["end"][0], 0.0, min(time, LOOK * time_scale), rtol, atol)
     order = np.argsort(-values, kind="stable")
     values, errors = values[order], errors[order]
     # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
@@ -268,72 +268,72 @@ def lyapunov_spectrum(
         dimension,
         verdict,
         fate.period if verdict == "periodic orbit" else np.nan,
-        _invariants(model, values, found["mean"][0], found["product"][0]),
-        float(found["time"][0]),
+        _invariants(model, values, orbits["mean"][0], orbits["product"][0]),
+        float(orbits["time"][0]),
         aside,
-        found["end"][0],
+        orbits["end"][0],
         converged,
         model,
-        None if section is None else run.points(found["end"][0], section),
+        None if section is None else run.points(orbits["end"][0], section),
     )
 
 
-def _verdict(run: _Run, fate: Fate, found: _core._Orbits) -> str:
+def _verdict(run: _Run, fate: Fate, orbits: _core._Orbits) -> str:
     """The verdict: the fate of the orbit if the exponents agree with it, else what the exponents say."""
     time_scale = run.model.time_scale
-    zeros = _zeros(run, found)
+    zeros = _zeros(run, orbits)
     if fate.kind == "periodic orbit":
         # Nothing grows or shrinks along a cycle.
-        long = float(found["time"][0]) > _PERIODS * fate.period
+        long = float(orbits["time"][0]) > _PERIODS * fate.period
         return "undecided" if long and zeros < 1 else fate.kind
     if fate.ordered:
         return fate.kind
     if fate.kind == "settling":
-        return "torus" if _neither_settles_nor_parts(run, fate, found) else "undecided"
-    if _positive(found, time_scale):
+        return "torus" if _neither_settles_nor_parts(run, fate, orbits) else "undecided"
+    if _positive(orbits, time_scale):
         # Orbits in a plane cannot cross, so that none of them is chaotic.
         return "chaos" if len(run.kept) + run.timed > 2 else "undecided"
-    value = found["value"][0]
+    value = orbits["value"][0]
     if value.max() < _STAYS / time_scale and np.isfinite(fate.clock):
         # Neighbours stay as near as they are over many returns of the orbit.
-        if zeros >= 2 and float(found["time"][0]) > _PERIODS * fate.clock:
+        if zeros >= 2 and float(orbits["time"][0]) > _PERIODS * fate.clock:
             return "torus"
         if zeros == 1:
             return "periodic orbit"
     return "undecided"
 
 
-def _neither_settles_nor_parts(run: _Run, fate: Fate, found: _core._Orbits) -> bool:
+def _neither_settles_nor_parts(run: _Run, fate: Fate, orbits: _core._Orbits) -> bool:
     """Whether distances in two directions stayed as they were for the whole of a long run.
 
     A torus that nearly comes back looks as if it settled, but what settles shrinks meanwhile.
     """
-    time = float(found["time"][0])
-    growth = found["value"][0] * time
+    time = float(orbits["time"][0])
+    growth = orbits["value"][0] * time
     free = len(run.model.state_names) - len(run.kept)
     stay = int((np.abs(growth) < _GROWTH).sum()) - free + run.timed
     return bool(stay >= 2 and growth.max() < _GROWTH and time > _LONG * fate.clock)
 
 
-def _zeros(run: _Run, found: _core._Orbits) -> int:
+def _zeros(run: _Run, orbits: _core._Orbits) -> int:
     """In how many directions distances stay as they are, beside angles that nothing depends on.
 
     Time is a direction, too, if the rates depend on it.
     """
     free = len(run.model.state_names) - len(run.kept)
-    small = np.maximum(_SIGMAS * np.nan_to_num(found["standard_error"][0]), _STAYS / run.model.time_scale)
-    return int((np.abs(found["value"][0]) < small).sum()) - free + run.timed
+    small = np.maximum(_SIGMAS * np.nan_to_num(orbits["standard_error"][0]), _STAYS / run.model.time_scale)
+    return int((np.abs(orbits["value"][0]) < small).sum()) - free + run.timed
 
 
-def _positive(found: _core._Orbits, time_scale: float) -> bool:
+def _positive(orbits: _core._Orbits, time_scale: float) -> bool:
     """Whether neighbouring orbits part, and faster than by any power of the time up to the second.
 
     Where energy is kept those of regular motion part in proportion to time. The scatter of an exponent's
     means does not show that: all of them are above zero.
     """
-    value, time = found["value"][0, 0], float(found["time"][0])
+    value, time = orbits["value"][0, 0], float(orbits["time"][0])
     grown = value * time > _POWER * np.log1p(time / time_scale)
-    return bool(value > _SIGMAS * found["standard_error"][0, 0] and grown)
+    return bool(value > _SIGMAS * orbits["standard_error"][0, 0] and grown)
 
 
 @dataclass(frozen=True)
@@ -347,15 +347,15 @@ class _Run(Orbit):
 
     def look(self, start: _Floats, time: float, skipped: float, goal: float) -> tuple[_core._Orbits, Fate]:
         """The exponents of a run, and what becomes of the orbit after it."""
-        found = self(start, time, skipped, goal)
-        outcome, end = int(found["outcome"][0]), found["end"][0]
+        orbits = self(start, time, skipped, goal)
+        outcome, end = int(orbits["outcome"][0]), orbits["end"][0]
         if outcome == FINISHED:
-            return found, self.fate(end)
+            return orbits, self.fate(end)
         plain = [name not in self.model.angles for name in self.model.state_names]
         far = np.abs(end) > _FAR * np.maximum(1.0, np.abs(start))
         if outcome == FAILED and (far & plain).any():
-            return found, Fate("escapes", np.nan, end, 0.0)
-        raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome], found['failure'])}")
+            return orbits, Fate("escapes", np.nan, end, 0.0)
+        raise IntegrationError(f"there is no spectrum: {reason(OUTCOMES[outcome], orbits['failure'])}")
 
     def refuse(self, section: str | Sequence[str], start: _Floats) -> None:
         """Refuse a surface that cannot be used, before the long run."""
@@ -505,12 +505,12 @@ def covariant_vectors(
         f"{count:.6g} intervals", int(min(count, 1e300)), itemsize=8 * len(start) * (4 * len(start) + 3)
     )
     extra = int(np.ceil(aside / step))
-    found = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol, longest)
+    raw = _core.frames(model, start.tolist(), step, int(n) + 2 * extra, rtol, atol, longest)
     kept = slice(extra, extra + n + 1)
     times: _Floats = step * np.arange(extra, extra + n + 1, dtype=np.float64)
     return Covariant(
         times,
-        found["states"][kept],
-        found["covariant"][kept],
-        found["growth"][extra : extra + n] / step,
+        raw["states"][kept],
+        raw["covariant"][kept],
+        raw["growth"][extra : extra + n] / step,
     )

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         raise UddError("basins take one --state, for the components that are not on the grid")
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
-        found = basins(
+        result = basins(
             model_of(args, {}),
             grid,
             state0=None if starts is None else starts[0],
@@ -73,25 +73,25 @@ def run(args: argparse.Namespace) -> CommandResult:
             **runs_of(args),
             partial=True,
         )
-    cycles = _cycles(model_of(args, {}), found) if args.cycles else {}
+    cycles = _cycles(model_of(args, {}), result) if args.cycles else {}
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
-    save(args.out, found, lambda ax: draw(found, ax))
+    save(args.out, result, lambda ax: draw(result, ax))
     stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
-    data = {**summary_of(found), "complete": not stopped, "files": args.out}
+    data = {**summary_of(result), "complete": not stopped, "files": args.out}
     for one in data["attractors"]:
         if one["number"] in cycles:
             one["cycle"] = cycles[one["number"]]
     return CommandResult(_text(data), data, 130 if stopped else 0)
 
 
-def _cycles(model: Model, found: xr.Dataset) -> dict[int, dict[str, Any]]:
+def _cycles(model: Model, result: xr.Dataset) -> dict[int, dict[str, Any]]:
     """The cycle of each attractor that is one."""
     from udd.bifurcations import periodic_orbit
 
     cycles = {}
-    for k in found["number"].to_numpy():
-        one = found.sel(number=k)
+    for k in result["number"].to_numpy():
+        one = result.sel(number=k)
         if not float(one["period_time"]) > 0.0:
             continue
         try:
@@ -123,35 +123,35 @@ def _component(text: str) -> tuple[str, Any]:
     return name, axis_of(first, last, n)
 
 
-def summary_of(found: xr.Dataset) -> dict[str, Any]:
+def summary_of(result: xr.Dataset) -> dict[str, Any]:
     """The basins without the grid: the attractors, the fractions, the exponent."""
-    kinds = str(found["kind"].attrs["flag_meanings"]).split()
+    kinds = str(result["kind"].attrs["flag_meanings"]).split()
     table = [
         {
-            "number": int(one["number"]),
-            "kind": kinds[int(one["kind"])],
-            "period": int(one["period"]),
-            "period_time": float(one["period_time"]),
-            "mirror": int(one["mirror"]),
+            "number": int(attractor["number"]),
+            "kind": kinds[int(attractor["kind"])],
+            "period": int(attractor["period"]),
+            "period_time": float(attractor["period_time"]),
+            "mirror": int(attractor["mirror"]),
         }
-        for one in (found.sel(number=k) for k in found["number"].to_numpy())
+        for attractor in (result.sel(number=k) for k in result["number"].to_numpy())
     ]
     fractions = [
         {"ending": str(ending), "fraction": float(share), "standard_error": float(error)}
         for ending, share, error in zip(
-            found["ending"].to_numpy(),
-            found["fraction"].to_numpy(),
-            found["fraction_error"].to_numpy(),
+            result["ending"].to_numpy(),
+            result["fraction"].to_numpy(),
+            result["fraction_error"].to_numpy(),
             strict=True,
         )
     ]
     exponent = {
-        "value": float(found["uncertainty_exponent"]),
-        "standard_error": float(found["uncertainty_exponent_error"]),
+        "value": float(result["uncertainty_exponent"]),
+        "standard_error": float(result["uncertainty_exponent_error"]),
     }
     return {
-        "model": found.attrs["model"],
-        "grid": {name: found.sizes[name] for name in found.attrs["grid"].split()},
+        "model": result.attrs["model"],
+        "grid": {name: result.sizes[name] for name in result.attrs["grid"].split()},
         "attractors": table,
         "fractions": fractions,
         "uncertainty_exponent": exponent,
@@ -173,12 +173,20 @@ def _text(data: dict[str, Any]) -> str:
     for k, end in enumerate(data["fractions"]):
         what = end["ending"]
         if k < len(data["attractors"]):
-            one = data["attractors"][k]
-            what += f", {one['kind']}"
-            what += f" {one['period']}, T = {one['period_time']:.8g}" if one["kind"] == "periodic" else ""
-            what += f", mirror image of {one['mirror']}" if one["mirror"] not in (0, one["number"]) else ""
-            if "cycle" in one:
-                what += f"; {_cycle_text(one['cycle'])}"
+            attractor = data["attractors"][k]
+            what += f", {attractor['kind']}"
+            what += (
+                f" {attractor['period']}, T = {attractor['period_time']:.8g}"
+                if attractor["kind"] == "periodic"
+                else ""
+            )
+            what += (
+                f", mirror image of {attractor['mirror']}"
+                if attractor["mirror"] not in (0, attractor["number"])
+                else ""
+            )
+            if "cycle" in attractor:
+                what += f"; {_cycle_text(attractor['cycle'])}"
         lines.append(f"  {100 * end['fraction']:.4g} +- {100 * end['standard_error']:.2g} %: {what}")
     exponent = data["uncertainty_exponent"]
     if exponent["value"] == exponent["value"]:

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     check_component(model, args.component)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
-        found = bifurcation(
+        diagram = bifurcation(
             model,
             args.parameter,
             values,
@@ -81,43 +81,45 @@ def run(args: argparse.Namespace) -> CommandResult:
         )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
-    save(args.out, found, lambda ax: draw(found, ax, component=args.component))
+    save(args.out, diagram, lambda ax: draw(diagram, ax, component=args.component))
     stopped = any(isinstance(warning.message, IncompleteWarning) for warning in said)
-    data = {**summary_of(found), "complete": not stopped, "files": args.out}
+    data = {**summary_of(diagram), "complete": not stopped, "files": args.out}
     return CommandResult(_text(data), data, 130 if stopped else 0)
 
 
-def summary_of(found: xr.Dataset) -> dict[str, Any]:
+def summary_of(diagram: xr.Dataset) -> dict[str, Any]:
     """The diagram without its points: outcomes, stretches of one period on one attractor, hysteresis."""
-    parameter = found.attrs["parameter"]
-    outcomes = found["outcome"]
+    parameter = diagram.attrs["parameter"]
+    outcomes = diagram["outcome"]
     names = str(outcomes.attrs["flag_meanings"]).split()
     counts = {name: int((outcomes == k).sum()) for k, name in enumerate(names)}
     stretches = []
-    for path in found["path"].to_numpy():
-        for start in found["start"].to_numpy():
-            one = found.sel(path=path, start=start)
+    for path in diagram["path"].to_numpy():
+        for start in diagram["start"].to_numpy():
+            one = diagram.sel(path=path, start=start)
             stretches += [{"path": str(path), "start": int(start), **s} for s in _stretches(one, parameter)]
-    intervals = found["hysteresis_interval"].to_numpy().tolist() if "hysteresis_interval" in found else None
+    intervals = (
+        diagram["hysteresis_interval"].to_numpy().tolist() if "hysteresis_interval" in diagram else None
+    )
     return {
-        "model": found.attrs["model"],
+        "model": diagram.attrs["model"],
         "parameter": parameter,
         "shape": dict(
-            zip(("path", "start", "value", "point"), (*outcomes.shape, found.sizes["point"]), strict=True)
+            zip(("path", "start", "value", "point"), (*outcomes.shape, diagram.sizes["point"]), strict=True)
         ),
         "outcomes": {name: count for name, count in counts.items() if count},
-        "attractors": int(found["attractor"].max()),
+        "attractors": int(diagram["attractor"].max()),
         "stretches": stretches,
         "hysteresis": intervals,
     }
 
 
-def _stretches(one: xr.Dataset, parameter: str) -> list[dict[str, Any]]:
+def _stretches(path_data: xr.Dataset, parameter: str) -> list[dict[str, Any]]:
     """Neighbouring values with the same kind, period and attractor."""
     rows: list[dict[str, Any]] = []
-    names = str(one["kind"].attrs["flag_meanings"]).split()
+    names = str(path_data["kind"].attrs["flag_meanings"]).split()
     keys = (parameter, "kind", "period", "attractor", "symmetric")
-    columns = (one[name].to_numpy().tolist() for name in keys)
+    columns = (path_data[name].to_numpy().tolist() for name in keys)
     for value, kind, period, attractor, symmetric in zip(*columns, strict=True):
         word = names[kind].replace("_", " ")
         now = {"kind": word, "period": period, "attractor": attractor, "symmetric": symmetric}

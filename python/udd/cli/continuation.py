@@ -155,19 +155,19 @@ def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str
     ]
     if not ways:
         raise UddError("there is no period doubling or symmetry breaking from which a cascade could go on")
-    found = cascade(ways[0], bounds=(args.first, args.last), n=args.cascade)
+    doublings = cascade(ways[0], bounds=(args.first, args.last), n=args.cascade)
     data = {
-        "values": found.values.tolist(),
-        "errors": found.errors.tolist(),
-        "ratios": found.ratios.tolist(),
-        "limit": found.limit,
-        "limit_error": found.limit_error,
+        "values": doublings.values.tolist(),
+        "errors": doublings.errors.tolist(),
+        "ratios": doublings.ratios.tolist(),
+        "limit": doublings.limit,
+        "limit_error": doublings.limit_error,
     }
-    lines = [f"period doublings over {found.parameter}:"]
-    for k, (value, error) in enumerate(zip(found.values, found.errors, strict=True)):
-        ratio = f"   ratio {found.ratios[k - 2]:.6g}" if k >= 2 else ""
+    lines = [f"period doublings over {doublings.parameter}:"]
+    for k, (value, error) in enumerate(zip(doublings.values, doublings.errors, strict=True)):
+        ratio = f"   ratio {doublings.ratios[k - 2]:.6g}" if k >= 2 else ""
         lines.append(f"  {value:.12g} (error below {error:.1g}){ratio}")
-    lines.append(f"  they accumulate at {found.limit:.11g} (error below {found.limit_error:.1g})")
+    lines.append(f"  they accumulate at {doublings.limit:.11g} (error below {doublings.limit_error:.1g})")
     return data, "\n".join(lines)
 
 

@@ -85,15 +85,15 @@ def checked(paths: list[Path], data: tuple[str, ...] = DATA) -> None:
             raise UddError(f"{path} exists already: Zarr needs a new folder")
 
 
-def save(paths: list[Path], found: xr.Dataset, draw: Callable[[Axes], object]) -> None:
+def save(paths: list[Path], result: xr.Dataset, draw: Callable[[Axes], object]) -> None:
     """Write what is asked for; a file is there whole or not at all."""
     from udd._util.atomic_files import write_whole
 
     for path in paths:
         if path.suffix == ".nc":
-            write_whole(path, bytes(found.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+            write_whole(path, bytes(result.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
         elif path.suffix == ".zarr":
-            _zarr(path, found)
+            _zarr(path, result)
         else:
             save_picture(path, draw)
 
@@ -116,15 +116,17 @@ def save_figure(path: Path, figure: Figure) -> None:
     write_whole(path, picture.getvalue())
 
 
-def _zarr(path: Path, found: xr.Dataset) -> None:
+def _zarr(path: Path, result: xr.Dataset) -> None:
     try:
         folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
     except OSError as error:
         raise UddError(f"{path} cannot be written: {error.strerror}") from None
     try:
         # Zarr 3 has no arrays of strings of one length.
-        words = {name: found[name].astype(object) for name in found.coords if found[name].dtype.kind == "U"}
-        found.assign_coords(words).to_zarr(folder / "made", zarr_format=3, consolidated=False)
+        words = {
+            name: result[name].astype(object) for name in result.coords if result[name].dtype.kind == "U"
+        }
+        result.assign_coords(words).to_zarr(folder / "made", zarr_format=3, consolidated=False)
         os.replace(folder / "made", path)
     except OSError as error:
         raise UddError(f"{path} cannot be written: {error.strerror or error}") from None

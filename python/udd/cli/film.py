@@ -95,7 +95,7 @@ def _defects(given: list[str]) -> Any:
     from udd.film import Defects
 
     names = [f.name for f in fields(Defects)]
-    found: dict[str, Any] = {}
+    defects: dict[str, Any] = {}
     for text in given:
         name, sign, value = text.partition("=")
         if not sign or name not in names:
@@ -104,10 +104,10 @@ def _defects(given: list[str]) -> Any:
         if hint and isinstance(getattr(Defects, name), int | float):
             raise UddError(f"--defect {name}: {hint}")
         try:
-            found[name] = ast.literal_eval(value)
+            defects[name] = ast.literal_eval(value)
         except (ValueError, SyntaxError, RecursionError, MemoryError):
             raise UddError(f"--defect {name}: {value!r} is no number and no tuple of numbers") from None
     try:
-        return Defects(**found)
+        return Defects(**defects)
     except TypeError:
         raise UddError(f"--defect: a value is of the wrong kind among {', '.join(given)}") from None

@@ -38,12 +38,12 @@ def run(args: argparse.Namespace) -> CommandResult:
     given = inputs_of(args)
     with status_line() as tell:
         tell("fitting")
-        found = fit(*given.measured, **options(args))
+        fitted = fit(*given.measured, **options(args))
     if not args.uncertainties:
-        return CommandResult(str(found), {**given.told, **found.to_dict()})
-    tables = found.budget()
-    text = f"{found}\n\nexpanded uncertainties, and shares of the variance:\n{tables}"
-    return CommandResult(text, {**given.told, **found.to_dict(), **tables.to_dict()})
+        return CommandResult(str(fitted), {**given.told, **fitted.to_dict()})
+    tables = fitted.budget()
+    text = f"{fitted}\n\nexpanded uncertainties, and shares of the variance:\n{tables}"
+    return CommandResult(text, {**given.told, **fitted.to_dict(), **tables.to_dict()})
 
 
 def options(args: argparse.Namespace) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         tell("fitting")
         fitted = fit(known, model, **options(args))
         tell("running the ensemble")
-        found = forecast(
+        prediction = forecast(
             measurement,
             fitted,
             args.t,
@@ -81,49 +81,57 @@ def run(args: argparse.Namespace) -> CommandResult:
             rng=args.seed,
         )
     for path in args.out:
-        _write(path, found)
-    text = "\n".join([describe(found), *(f"written: {path}" for path in args.out)])
-    return CommandResult(text, {**given.told, **found.to_dict(), "files": args.out})
+        _write(path, prediction)
+    text = "\n".join([describe(prediction), *(f"written: {path}" for path in args.out)])
+    return CommandResult(text, {**given.told, **prediction.to_dict(), "files": args.out})
 
 
-def describe(found: Forecast) -> str:
+def describe(prediction: Forecast) -> str:
     """A forecast in a few lines."""
-    unit, factor = small_unit(found.fit.model.profile.sensor.error_unit)
-    within = f"{factor * found.error:.3g} {unit}"
-    reach = found.t[-1] - found.start
-    lines = [f"forecast from T = {found.start:.5g} s for {reach:.4g} s, {len(found.members)} members"]
-    if math.isfinite(found.valid_time):
-        latest = f"{found.valid_high:.3g}" if math.isfinite(found.valid_high) else f"over {reach:.3g}"
+    unit, factor = small_unit(prediction.fit.model.profile.sensor.error_unit)
+    within = f"{factor * prediction.error:.3g} {unit}"
+    reach = prediction.t[-1] - prediction.start
+    lines = [
+        f"forecast from T = {prediction.start:.5g} s for {reach:.4g} s, {len(prediction.members)} members"
+    ]
+    if math.isfinite(prediction.valid_time):
+        latest = (
+            f"{prediction.valid_high:.3g}" if math.isfinite(prediction.valid_high) else f"over {reach:.3g}"
+        )
         lines.append(
-            f"  valid to {within} for {found.valid_time:.3g} s "
-            f"({100 * found.level:g} % of the members: {found.valid_low:.3g} to {latest} s)"
+            f"  valid to {within} for {prediction.valid_time:.3g} s "
+            f"({100 * prediction.level:g} % of the members: {prediction.valid_low:.3g} to {latest} s)"
         )
     else:
         lines.append(f"  valid to {within} to its end")
-    if math.isfinite(found.lyapunov_time):
-        times = f"; valid for {found.lyapunov_times:.2g} of them" if math.isfinite(found.valid_time) else ""
-        lines.append(f"  Lyapunov time of the fitted model: {found.lyapunov_time:.3g} s{times}")
-    elif math.isinf(found.lyapunov_time):
+    if math.isfinite(prediction.lyapunov_time):
+        times = (
+            f"; valid for {prediction.lyapunov_times:.2g} of them"
+            if math.isfinite(prediction.valid_time)
+            else ""
+        )
+        lines.append(f"  Lyapunov time of the fitted model: {prediction.lyapunov_time:.3g} s{times}")
+    elif math.isinf(prediction.lyapunov_time):
         lines.append("  errors of the fitted model do not grow in the long run")
-    if math.isfinite(found.measured_valid_time):
-        lines.append(f"  the measurement parted from the median after {found.measured_valid_time:.3g} s")
+    if math.isfinite(prediction.measured_valid_time):
+        lines.append(f"  the measurement parted from the median after {prediction.measured_valid_time:.3g} s")
     return "\n".join(lines)
 
 
-def _write(path: Path, found: Forecast) -> None:
+def _write(path: Path, prediction: Forecast) -> None:
     from udd._util.atomic_files import write_whole
 
     if path.suffix == ".csv":
-        write_whole(path, _csv(found).encode())
+        write_whole(path, _csv(prediction).encode())
         return
     from matplotlib.figure import Figure
 
     from udd.plot import forecast as draw
 
-    figure = Figure(figsize=(9.0, 2.6 * len(found.names) + 0.4), layout="constrained")
-    axes = figure.subplots(len(found.names), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, name in zip(axes, found.names, strict=True):
-        draw(found, ax, coordinate=name)
+    figure = Figure(figsize=(9.0, 2.6 * len(prediction.names) + 0.4), layout="constrained")
+    axes = figure.subplots(len(prediction.names), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, name in zip(axes, prediction.names, strict=True):
+        draw(prediction, ax, coordinate=name)
         if ax is not axes[0]:
             ax.get_legend().remove()
         if ax is not axes[-1]:
@@ -131,13 +139,17 @@ def _write(path: Path, found: Forecast) -> None:
     save_figure(path, figure)
 
 
-def _csv(found: Forecast) -> str:
+def _csv(prediction: Forecast) -> str:
     """The curves: t, then median, low and high of each channel."""
-    head = ["t", *(f"{name}{end}" for name in found.names for end in ("", "_low", "_high"))]
+    head = ["t", *(f"{name}{end}" for name in prediction.names for end in ("", "_low", "_high"))]
     rows = [",".join(head)]
-    for k, t in enumerate(found.t.tolist()):
+    for k, t in enumerate(prediction.t.tolist()):
         cells = [t]
-        for m in range(len(found.names)):
-            cells += [float(found.median[k, m]), float(found.low[k, m]), float(found.high[k, m])]
+        for m in range(len(prediction.names)):
+            cells += [
+                float(prediction.median[k, m]),
+                float(prediction.low[k, m]),
+                float(prediction.high[k, m]),
+            ]
         rows.append(",".join(map(repr, cells)))
     return "\n".join(rows) + "\n"

@@ -79,12 +79,12 @@ def run(args: argparse.Namespace) -> CommandResult:
         print(",".join(head), flush=True)
     with progress_bar(len(drives), "value", shown_progress() if len(drives) > 1 else False) as bar:
         try:
-            for found in portions(swept, args):
-                rows += found
-                bar.update(len(found))
+            for portion in portions(swept, args):
+                rows += portion
+                bar.update(len(portion))
                 if not args.json:
                     bar.clear()
-                    print("\n".join(map(_line, found)), flush=True)
+                    print("\n".join(map(_line, portion)), flush=True)
         except KeyboardInterrupt:
             stopped = True
     _tell(rows, args)
@@ -210,14 +210,20 @@ def _spectra(swept: _Swept, args: argparse.Namespace) -> Iterator[list[_Row]]:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ConvergenceWarning)
-                found = lyapunov_spectrum(model, t=args.t, tol=args.tol, state0=swept.start)
+                spectrum = lyapunov_spectrum(model, t=args.t, tol=args.tol, state0=swept.start)
         except IntegrationError:
             absent = [math.nan] * (2 * len(model.state_names) + 1)
             yield [_Row((value, *absent, "failed", math.nan), False)]
             continue
-        pairs = zip(found.exponents.tolist(), found.standard_errors.tolist(), strict=True)
-        cells = (value, *(x for pair in pairs for x in pair), found.dimension, found.verdict, found.period)
-        yield [_Row(cells, found.converged)]
+        pairs = zip(spectrum.exponents.tolist(), spectrum.standard_errors.tolist(), strict=True)
+        cells = (
+            value,
+            *(x for pair in pairs for x in pair),
+            spectrum.dimension,
+            spectrum.verdict,
+            spectrum.period,
+        )
+        yield [_Row(cells, spectrum.converged)]
 
 
 def _line(row: _Row) -> str:

@@ -66,12 +66,12 @@ def chosen(args: argparse.Namespace, drives: Mapping[str, float | None]) -> Mode
     from udd.models import DLE
 
     w, length, W = drives["w"], drives["pendulum"], drives["W"]
-    own = getattr(args, "model", None)
-    if sum(value is not None for value in (*drives.values(), own)) != 1:
+    model_file = getattr(args, "model", None)
+    if sum(value is not None for value in (*drives.values(), model_file)) != 1:
         raise UddError(
             "say which model: --disk W, --w (the DLE), --pendulum LENGTH or --model FILE, one of them"
         )
-    if own is not None:
+    if model_file is not None:
         return own_model(args)
     if w is not None:
         refuse_others(args, "dle")

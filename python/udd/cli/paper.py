@@ -43,33 +43,38 @@ def run(args: argparse.Namespace) -> CommandResult:
     from udd.paper import CLAIMS, FIGURES, reproduce
 
     if args.list:
-        rows = [f"{one.key:28} {one.paper}: {one.title}" for one in FIGURES.values()]
-        rows += [f"{one.key:28} {one.place}: {one.says}" for one in CLAIMS.values()]
+        rows = [f"{entry.key:28} {entry.paper}: {entry.title}" for entry in FIGURES.values()]
+        rows += [f"{entry.key:28} {entry.place}: {entry.says}" for entry in CLAIMS.values()]
         return CommandResult("\n".join(rows), {"figures": list(FIGURES), "claims": list(CLAIMS)})
     with status_line() as tell:
         made = reproduce(args.out, only=args.only, films=not args.no_films, progress=tell)
-    lines = [f"{one.verdict.verdict:20} {one.claim.says}" for one in made.claims]
+    lines = [f"{entry.verdict.verdict:20} {entry.claim.says}" for entry in made.claims]
     if made.left_out:
-        lines.append(f"left out, since they need films: {', '.join(one.key for one in made.left_out)}")
+        lines.append(f"left out, since they need films: {', '.join(entry.key for entry in made.left_out)}")
     text = "\n".join([*lines, f"page: {made.page}"])
     data = {
         "page": made.page,
-        "left_out": [one.key for one in made.left_out],
+        "left_out": [entry.key for entry in made.left_out],
         "figures": [
-            {"key": one.figure.key, "paper": one.figure.paper, "file": one.path, "seconds": one.seconds}
-            for one in made.figures
+            {
+                "key": entry.figure.key,
+                "paper": entry.figure.paper,
+                "file": entry.path,
+                "seconds": entry.seconds,
+            }
+            for entry in made.figures
         ],
         "claims": [
             {
-                "key": one.claim.key,
-                "place": one.claim.place,
-                "says": one.claim.says,
-                "verdict": one.verdict.verdict,
-                "evidence": one.verdict.evidence,
-                "remark": one.verdict.remark,
-                "seconds": one.seconds,
+                "key": entry.claim.key,
+                "place": entry.claim.place,
+                "says": entry.claim.says,
+                "verdict": entry.verdict.verdict,
+                "evidence": entry.verdict.evidence,
+                "remark": entry.verdict.remark,
+                "seconds": entry.seconds,
             }
-            for one in made.claims
+            for entry in made.claims
         ],
     }
     return CommandResult(text, data)

@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     check_component(model, args.component)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
-        found = poincare(
+        section = poincare(
             model,
             args.section,
             args.points,
@@ -95,13 +95,13 @@ def run(args: argparse.Namespace) -> CommandResult:
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
     files = []
-    table = "\n".join(_lines(found))
+    table = "\n".join(_lines(section))
     if args.out is not None:
         write_whole(args.out, f"{table}\n".encode())
         files.append(args.out)
     for path, make in (
-        (args.picture, lambda ax: draw(found, ax)),
-        (args.map, lambda ax: return_map(found, ax, component=args.component)),
+        (args.picture, lambda ax: draw(section, ax)),
+        (args.map, lambda ax: return_map(section, ax, component=args.component)),
     ):
         if path is not None:
             save_picture(path, make, (6.4, 4.8))
@@ -109,15 +109,15 @@ def run(args: argparse.Namespace) -> CommandResult:
     stopped = any(isinstance(one.message, IncompleteWarning) and one.message.interrupted for one in said)
     data = {
         "model": repr(model),
-        "section": found.section,
-        "direction": found.direction,
-        "points": found.found,
-        "residual": found.residual,
-        "outcome": found.outcome,
-        "mean_return_time": float(_mean_gap(found)),
-        "t": found.t,
-        "state": found.state,
-        "which": found.which,
+        "section": section.section,
+        "direction": section.direction,
+        "points": section.found,
+        "residual": section.residual,
+        "outcome": section.outcome,
+        "mean_return_time": float(_mean_gap(section)),
+        "t": section.t,
+        "state": section.state,
+        "which": section.which,
         "files": files,
     }
     if files and not args.json:
@@ -130,12 +130,14 @@ def _mean_gap(found: Section) -> float:
     return float((found.t[-1] - found.t[0]) / (found.found - 1)) if found.found > 1 else float("nan")
 
 
-def _lines(found: Section) -> list[str]:
+def _lines(section: Section) -> list[str]:
     """The table, to the last digit."""
-    several = len(found.section) > 1
-    head = ["t", *found.model.state_names] + (["section"] if several else [])
+    several = len(section.section) > 1
+    head = ["t", *section.model.state_names] + (["section"] if several else [])
     rows = [",".join(head)]
-    for t, state, which in zip(found.t.tolist(), found.state.tolist(), found.which.tolist(), strict=True):
+    for t, state, which in zip(
+        section.t.tolist(), section.state.tolist(), section.which.tolist(), strict=True
+    ):
         cells = [repr(value) for value in (t, *state)] + ([str(which)] if several else [])
         rows.append(",".join(cells))
     return rows

@@ -69,29 +69,29 @@ def run(args: argparse.Namespace) -> CommandResult:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
         if args.dask is None:
-            found = sweep(spec, store=args.store, progress=shown_progress(), partial=True)
+            result = sweep(spec, store=args.store, progress=shown_progress(), partial=True)
         else:
             with _client(args.dask) as client:
-                found = sweep(
+                result = sweep(
                     spec, client.get_executor(), args.store, progress=shown_progress(), partial=True
                 )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
     unfinished = [w.message for w in said if isinstance(w.message, IncompleteWarning)]
-    data = {**_counted(found), "complete": not unfinished, "store": args.store, "spec_sha256": spec.sha256}
+    data = {**_counted(result), "complete": not unfinished, "store": args.store, "spec_sha256": spec.sha256}
     code = 0 if not unfinished else 130 if unfinished[0].interrupted else 1
     return CommandResult(_text(spec, data), data, code)
 
 
-def _counted(found: xr.Dataset) -> dict[str, Any]:
+def _counted(result: xr.Dataset) -> dict[str, Any]:
     """How many trajectories have which outcome."""
-    outcome = found["outcome"]
+    outcome = result["outcome"]
     ends = outcome.to_numpy()  # a byte each
     names = str(outcome.attrs["flag_meanings"]).split()
     flags = zip(names, outcome.attrs["flag_values"], strict=True)
     counts = {name: int((ends == value).sum()) for name, value in flags}
     outcomes = {name: count for name, count in counts.items() if count}
-    return {"quantity": found.attrs["quantity"], "shape": outcome.shape, "outcomes": outcomes}
+    return {"quantity": result.attrs["quantity"], "shape": outcome.shape, "outcomes": outcomes}
 
 
 def _text(spec: SweepSpec, data: dict[str, Any]) -> str:

@@ -154,7 +154,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         from udd.video.writer import checked_path
 
         checked_path(args.overlay)
-    more = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
+    header = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
     said, before = ("", {}) if args.camera is None else _record(args)
     if args.click is not None:
@@ -163,7 +163,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         options, said, before = clicked(args, options)
     detail: list[Any] = []
     try:
-        m = _tracked(args, options, detail).with_meta(**more)
+        m = _tracked(args, options, detail).with_meta(**header)
     except UddError as error:
         _explain(args, options, str(error))
         if args.click is None:
@@ -266,12 +266,12 @@ def _tracked(
     def measure() -> Measurement:
         from udd.tracking.pipeline import Tracking, run_tracker
 
-        found = run_tracker(args.file, progress=shown_progress(), disk_radius=args.disk_radius, **options)
-        if not isinstance(found, Tracking):
-            return found
+        motion = run_tracker(args.file, progress=shown_progress(), disk_radius=args.disk_radius, **options)
+        if not isinstance(motion, Tracking):
+            return motion
         if detail is not None:
-            detail.append(found)
-        return found.measurement
+            detail.append(motion)
+        return motion.measurement
 
     m = whole(args, measure)
     if not args.smooth:
@@ -333,7 +333,7 @@ def _bob(said: str) -> Any:
 
 def _calibrate(said: str) -> dict[str, Any]:
     """From lens=off,readout=0.02."""
-    found: dict[str, Any] = {}
+    items: dict[str, Any] = {}
     for part in said.split(","):
         name, equals, value = (x.strip() for x in part.partition("="))
         if not equals:
@@ -341,8 +341,8 @@ def _calibrate(said: str) -> dict[str, Any]:
                 f"--calibrate must be like lens=off,readout=0.02 (the decimal sign is a point), not {said}"
             )
         switch = {"on": True, "off": False}.get(value)
-        found[name] = numbers([value], f"--calibrate {name}")[0] if switch is None else switch
-    return found
+        items[name] = numbers([value], f"--calibrate {name}")[0] if switch is None else switch
+    return items
 
 
 def _summary(m: Measurement) -> tuple[str, dict[str, Any]]:

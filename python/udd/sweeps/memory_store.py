@@ -37,13 +37,13 @@ class Memory:
     def __init__(self, spec: SweepSpec, grid: Grid, threads: int) -> None:
         self._spec, self._grid, self._threads = spec, grid, threads
         for v in variables_of(spec):
-            shape = (*grid.shape, *(n for _, n in v.more))
+            shape = (*grid.shape, *(n for _, n in v.dimensions))
             require_memory(
                 f"the results of {prod(grid.shape)} runs", *shape, itemsize=np.dtype(v.dtype).itemsize
             )
         self._done = np.zeros(len(grid), dtype=bool)
         self._arrays: Found = {
-            v.name: np.full((*grid.shape, *(n for _, n in v.more)), fill_of(v), dtype=v.dtype)
+            v.name: np.full((*grid.shape, *(n for _, n in v.dimensions)), fill_of(v), dtype=v.dtype)
             for v in variables_of(spec)
         }
 
@@ -74,7 +74,7 @@ class Memory:
 
         spec = self._spec
         data = {
-            v.name: ((*spec.over, *(name for name, _ in v.more)), self._arrays[v.name], attributes(v))
+            v.name: ((*spec.over, *(name for name, _ in v.dimensions)), self._arrays[v.name], attributes(v))
             for v in variables_of(spec)
         }
         axes = spec.axes.items()

@@ -35,13 +35,13 @@ Found: TypeAlias = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Variable:
-    """An array of the result; `more` names axes after those of the sweep, with their lengths."""
+    """An array of the result; `dimensions` names axes after those of the sweep, with their lengths."""
 
     name: str
     unit: str
     meaning: str
     dtype: str = "float64"
-    more: tuple[tuple[str, int], ...] = ()
+    dimensions: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
     unit = model.profile.dynamics.rate_unit
     numbers = (("number", len(model.state_names)),)
     return (
-        Variable("value", unit, "Lyapunov exponents", more=numbers),
-        Variable("standard_error", unit, "their standard errors", more=numbers),
+        Variable("value", unit, "Lyapunov exponents", dimensions=numbers),
+        Variable("standard_error", unit, "their standard errors", dimensions=numbers),
         Variable("converged", "1", "whether the first one's standard error met tol", "bool"),
     )
 
@@ -113,13 +113,13 @@ def _spectrum(
 ) -> Found:
     time = options["t"], options["transient"], options["tol"]
     batch = Batch(model, rows, states, options["rtol"], options["atol"], threads, None, _longest(options))
-    found = _core.lyapunov(batch, all, *time)
-    done = found["outcome"] == FINISHED
+    raw = _core.lyapunov(batch, all, *time)
+    done = raw["outcome"] == FINISHED
     return {
-        "value": np.where(done[:, None], found["value"], np.nan),
-        "standard_error": np.where(done[:, None], found["standard_error"], np.nan),
-        "converged": done & (found["standard_error"][:, 0] <= options["tol"]),
-        "outcome": found["outcome"].astype(np.int8),
+        "value": np.where(done[:, None], raw["value"], np.nan),
+        "standard_error": np.where(done[:, None], raw["standard_error"], np.nan),
+        "converged": done & (raw["standard_error"][:, 0] <= options["tol"]),
+        "outcome": raw["outcome"].astype(np.int8),
     }
 
 
@@ -166,12 +166,12 @@ def _ended(model: Model, rows: Floats, states: Floats, options: Options, threads
     if "bristle" in model.state_names:
         return _ended_one_by_one(model, rows, states, times, options)
     method = method_for(model, "auto", rtol)
-    found = _core.ensemble(
+    raw = _core.ensemble(
         Batch(model, rows, states, rtol, atol, threads, None, _longest(options)), times, method
     )
-    if (found["outcome"] == INTERRUPTED).any():
+    if (raw["outcome"] == INTERRUPTED).any():
         raise KeyboardInterrupt
-    return {name: found[name] for name in ("t_end", "end", "outcome")}
+    return {name: raw[name] for name in ("t_end", "end", "outcome")}
 
 
 def _ended_one_by_one(model: Model, rows: Floats, states: Floats, times: Floats, options: Options) -> Found:

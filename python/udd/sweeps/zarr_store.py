@@ -73,7 +73,7 @@ class SweepStore:
             if "done" not in self._group:  # made last
                 _make_template(self._group, spec, grid)
         self._arrays = {
-            v.name: _array(self._group, v.name, (*grid.shape, *(n for _, n in v.more)))
+            v.name: _array(self._group, v.name, (*grid.shape, *(n for _, n in v.dimensions)))
             for v in variables_of(spec)
         }
         self._done = _array(self._group, "done", grid.counts)
@@ -129,7 +129,7 @@ class SweepStore:
         """Return the stored arrays, which are read when they are accessed."""
         import xarray as xr
 
-        found: xr.Dataset = xr.open_zarr(
+        store_data: xr.Dataset = xr.open_zarr(
             self._group.store,
             group=self._group.path or None,
             consolidated=False,
@@ -137,7 +137,7 @@ class SweepStore:
             decode_cf=False,
             drop_variables=["done"],
         )
-        return found
+        return store_data
 
 
 @contextlib.contextmanager
@@ -178,12 +178,12 @@ def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, where: 
             group = zarr.create_group(new, zarr_format=3, attributes=spec_attributes(spec))
         else:
             raise UddError(f"{where} holds other things already: a sweep needs a new or an empty folder")
-    found = group.attrs.get(_HASH)
-    if found is None:
+    stored_hash = group.attrs.get(_HASH)
+    if stored_hash is None:
         raise UddError(f"{where} holds other data already: a sweep needs a place of its own")
-    if found != spec.sha256:
+    if stored_hash != spec.sha256:
         raise UddError(
-            f"{where} holds another sweep ({str(found)[:12]}, not {spec.sha256[:12]}): "
+            f"{where} holds another sweep ({str(stored_hash)[:12]}, not {spec.sha256[:12]}): "
             "take another place, or the spec that it was begun with"
         )
     return group
@@ -212,14 +212,14 @@ def _make_template(group: zarr.Group, spec: SweepSpec, grid: Grid) -> None:
         )
         coordinate[:] = values
     for variable in variables_of(spec):
-        lengths = tuple(n for _, n in variable.more)
+        lengths = tuple(n for _, n in variable.dimensions)
         make(
             variable.name,
             shape=(*grid.shape, *lengths),
             chunks=(*grid.box, *lengths),
             dtype=variable.dtype,
             fill_value=fill_of(variable),
-            dimension_names=(*names, *(name for name, _ in variable.more)),
+            dimension_names=(*names, *(name for name, _ in variable.dimensions)),
             attributes=attributes(variable),
         )
     make(
@@ -236,9 +236,9 @@ def _make_template(group: zarr.Group, spec: SweepSpec, grid: Grid) -> None:
 def _array(group: zarr.Group, name: str, shape: tuple[int, ...]) -> zarr.Array[Any]:
     import zarr
 
-    found = group.get(name)
-    if isinstance(found, zarr.Array) and found.shape != tuple(shape):
-        raise UddError(f"the store's array {name!r} has shape {found.shape}, not {tuple(shape)}")
-    if not isinstance(found, zarr.Array):
+    array = group.get(name)
+    if isinstance(array, zarr.Array) and array.shape != tuple(shape):
+        raise UddError(f"the store's array {name!r} has shape {array.shape}, not {tuple(shape)}")
+    if not isinstance(array, zarr.Array):
         raise UddError(f"the store's array {name!r} is missing: something has changed it")
-    return found
+    return array
