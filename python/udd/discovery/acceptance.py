@@ -91,7 +91,7 @@ class Step:
 class SearchState:
     """State of the search: fits of the training part and of all data, and held-out errors.
 
-    If whole records are held out both are one fit, of all other records.
+    With whole held-out records both are one fit, of all other records.
     """
 
     part: Fit

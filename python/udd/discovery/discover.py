@@ -50,7 +50,7 @@ from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
 
-#: Share of the record for training; the rest is held out.
+#: Share of the record for training; the rest is held-out data.
 TRAIN = 0.6
 _SHORTEST = 20  # frames; with fewer the training part determines no model and the rest tests none
 
@@ -109,7 +109,7 @@ def discover(
 
     *Several records* share the model, and an effect must be missing in all of them. Its amplitudes are fitted
     to each record separately; if it is not significant in a record that could show it, it is not identified.
-    Whole records can be held out instead of the last 40 % of each.
+    Whole records can replace the last 40 % of each as held-out data.
 
     Parameters
     ----------
@@ -120,10 +120,10 @@ def discover(
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
         Terms to try in a user's own model in addition to those made of its states: the state whose equation
-        gets the term, and the term, as in ``("v", "abs(v)*v")``; for a model with a mass matrix also a force,
+        gets the term, and the term, as in ``("v", "abs(v)*v")``. For a model with a mass matrix also a force,
         as in ``("force(b - a)", "q^5")``.
     held_out : iterable of int, optional
-        With several measurements, the numbers (from 0) of those that are held out whole and used by no fit.
+        With several measurements, the numbers (from 0) of those held out whole, which no fit uses.
         Effects are sought in all frames of the others, and are confirmed only by their cost on these. In
         names like ``W[0]`` the held-out measurements count last.
     budget : float, optional
@@ -216,7 +216,7 @@ def discover(
                     raise
                 constrained.update(more)
 
-    # If whole records are held out, the training data are all data that a fit may use.
+    # With whole held-out records, the training data are all data that a fit may use.
     base, *others_too = checked_units(measurement, model, options, fits)
     baseline = others_too[0] if others_too else base
     tests = Acceptance(record, ~train, clock, motion_time_scale(base), base.problem.free)
@@ -320,7 +320,7 @@ def _held_out(
         raise FitError(
             f"held_out must name some of the measurements 0 to {number - 1}, but not all, not {last}"
             if number > 1
-            else "held_out needs several measurements; with one its last part is held out"
+            else "held_out needs several measurements; with one, its last part is the held-out data"
         )
     return [k for k in range(number) if k not in last] + last, len(last)
 

@@ -91,7 +91,7 @@ def hints(discovery: Discovery) -> list[NextExperiment]:
     """Rank films that would distinguish the forms that the data cannot, the best first.
 
     Each film is simulated with the discovered model and added to the part of the record on which the forms
-    were compared; drive and camera of a new film are as uncertain as those of the first. If a form with the
+    were compared. Drive and camera of a new film are as uncertain as those of the first. If a form with the
     amplitudes ``a`` is true and another is fitted, chi2 increases by ``a (S - C T^-1 C') a``: ``S`` and ``T``
     are the information on the amplitudes of the two with everything else refitted, ``C`` is their cross
     information. Half of the increase, the smaller of the two forms', is the expected difference in log

@@ -112,8 +112,8 @@ def log_prior(trial: TrialFit, terms: int) -> float:
 def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]) -> bool:
     """Return True if one law can imitate another one, along the motion that was fitted with the other.
 
-    The law's constants are fitted to the other one's rates by least squares. What the parameters of the known
-    model can do is left out.
+    The law's constants are fitted to the other one's rates by least squares. The part that the known model's
+    parameters absorb is removed.
 
     Parameters
     ----------

@@ -238,8 +238,8 @@ class Discovery:
         Random forces that the model needs in addition to the effects, if random forces alone, as from a
         moving support, explain the data about as well. The effects are then not identified.
     held_out : tuple of int
-        Numbers of the measurements that were held out whole; empty if the last part of each was. Then `split`
-        is the time in the first measurement from which pictures show free runs.
+        Numbers of the measurements held out whole; empty if the last part of each is the held-out part. Then
+        `split` is the time in the first measurement from which pictures show free runs.
     undetermined : tuple of str
         Parameters that are not identifiable from the data; they were constrained to their given values.
     doubts : list of str

@@ -125,7 +125,7 @@ def with_surfaces(scores: ScoreRound) -> ScoreRound:
 
 
 def states_first(curves: list[Curve]) -> list[Curve]:
-    """Sort curves by evidence, with a penalty on coordinates that stand in for states.
+    """Sort curves by evidence, with a penalty on coordinates that replace states.
 
     Curves over time absorb anything slow, and curves over the direction can imitate those over Y and Z. A
     velocity without its momentum comes before the same with it.

@@ -344,7 +344,7 @@ class _Pruning:
             return None
 
     def _exchanged(self, current: Fit) -> Fit | None:
-        """Return a better set of terms, with one restored and others removed; None if there is none."""
+        """Return a better set of terms, with one restored and others removed; else None."""
         fixed = [
             f for f in self.full.problem.free if f.name in self.names and f.name not in current.parameters
         ]

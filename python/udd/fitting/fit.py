@@ -89,8 +89,8 @@ def fit(
         for all, or one for each that differs only in parameter values.
     free : iterable of str, optional
         Names of the model's free parameters. Default: ``k0, k1, k2, W`` (with a prior of 5 %) for a disk,
-        ``k0, length, inertia`` for a pendulum, in both cases with the amplitudes of all effects; all
-        parameters of a user's own model.
+        ``k0, length, inertia`` for a pendulum, and the amplitudes of all effects. For a user's own model all
+        parameters.
     camera : bool or iterable of str
         True if the camera's parameters are free, or the names of the free ones. A disk has the pivot ``y0,
         z0``, ``tilt``, ``scale``, the marks' centre ``right, up`` relative to the disk's, ``lag`` of the
@@ -422,7 +422,7 @@ def extend(fitted: Fit, effects: Sequence[Effect], amplitudes: Sequence[float], 
     amplitudes : sequence of float
         Start values of their amplitudes, in order.
     goal : Goal
-        What the fit must reach to be of use.
+        Targets that the fit must reach to be useful.
     """
     left = list(amplitudes)
     effects = [e.replace(**{p: left.pop(0) for p in e.amplitudes}) for e in effects]

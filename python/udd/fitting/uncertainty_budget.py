@@ -129,7 +129,7 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
     Notes
     -----
     The fit's covariance is ``C = (N + P)^-1`` with the information N of the frames and P of the priors, so
-    ``C = C N C + C P C``: the prior of a parameter j, of standard deviation s_j, contributes ``|C_ij|/s_j``
+    ``C = C N C + C P C``. The prior of a parameter j, of standard deviation s_j, contributes ``|C_ij|/s_j``
     to the uncertainty of i, and the rest comes from the noise. Each fixed parameter is changed by its
     standard uncertainty and the model is fitted again; the changes of the free parameters are its
     contributions.

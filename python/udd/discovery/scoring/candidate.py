@@ -58,6 +58,6 @@ class Candidate:
 def brakes_with_time(effect: effects.Effect) -> bool:
     """Return True if an effect is friction as a function of the time alone.
 
-    As a swing dies down, the time stands for its size as well.
+    As a swing decays, the effects of time and of amplitude are confounded.
     """
     return effect.slots[0] == "friction" and bool(re.search(r"\b[tT]\b", effect.equation))

@@ -38,10 +38,10 @@ _SWINGS = 0.3  # minimum ratio of the argument's standard deviation to its root 
 def terms(model: FormulaModel) -> list[Candidate]:
     """List every term that is tried in the equations of a user's own model, except dry friction.
 
-    - Of states that are not angles and of measured inputs: a constant, all products up to the third degree,
+    - For states that are not angles and for measured inputs: a constant, all products up to the third degree,
       and each times its absolute value. With more than four of them products go up to the second degree, and
       the cube of each is added.
-    - Of each angle and of the difference of every two angles: sine and cosine, also times each of the others
+    - For each angle and the difference of every two angles: sine and cosine, also times each of the others
       unless an equation then had more than 200 terms. If the rate of an angle is no state, it is added.
 
     Equations in which one state is the rate of another get no terms. In a mechanical model forces that

@@ -115,7 +115,7 @@ def _sample(curve: Curve) -> Array:
     low, high = np.quantile(curve.places[0], (0.002, 0.998))
     grid = np.linspace(low, high, 600)
     errors = curve.errors(grid)
-    # Where the known model can absorb all of the curve, its error would be zero.
+    # The error would be zero if the known model can absorb all of the curve.
     weight = np.cumsum(1.0 / np.maximum(errors, (_SURE * errors.max()) or 1.0) ** 2)
     result: Array = np.interp((np.arange(_PLACES) + 0.5) / _PLACES, weight / weight[-1], grid)
     return result

@@ -101,8 +101,8 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
 
     Usual forms (powers, steps, bumps, waves) and those from symbolic regression (pyoperon, if installed) are
     fitted to the curve's coefficients with their full information, which accounts for confounding with the
-    free parameters. Each constant costs as much as in the Bayesian information criterion, and each operation
-    its description length. Needless constants are removed.
+    free parameters. Each constant costs its price in the Bayesian
+    information criterion, and each operation its description length. Needless constants are removed.
 
     Parameters
     ----------

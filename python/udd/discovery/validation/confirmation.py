@@ -34,7 +34,7 @@ def confirmed_by(
     held-out frames cost significantly less. Second, chi2 decreases significantly further when these frames
     are fitted too; this test is stronger, because the parameters' errors do not count. Third, if the held-out
     frames carry too little information on the effect, each half of the record (alternate blocks) decreases
-    chi2 further than the other half alone. If whole records are held out, only the first test applies.
+    chi2 further than the other half alone. With whole held-out records, only the first test applies.
 
     Parameters
     ----------

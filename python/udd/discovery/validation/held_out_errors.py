@@ -316,7 +316,7 @@ def _settled(record: Record, frames: NDArray[np.int64], window: float) -> int:
 def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_], window: float) -> Array:
     """Compute errors of free runs from the last fitted frame of each measurement to its end, frame by frame.
 
-    For a measurement that is held out whole, the run starts from the state that its first frames show.
+    For a whole held-out measurement, the run starts from the state that its first frames show.
     """
     errors = np.full(len(record.t), np.nan)
     for frames in _held_out_of(record, held_out):

@@ -63,7 +63,7 @@ def theta_plateaus(_lab: Lab) -> Verdict:
         f"at 1.4 cm/s; it goes on to another multiple in {', '.join(words)}"
     )
     otherwise = (
-        "the side of the fall before does not decide: Θ goes on exactly if the centre falls to the other "
+        "the side of the fall before does not decide. Θ goes on exactly if the centre falls to the other "
         "side than that on which it rose past the contact, in all of these falls"
         if all(same)
         else "the side on which the centre rose does not decide either"

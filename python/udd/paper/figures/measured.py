@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @figure(
     "marks",
     paper="Figure 3",
-    title="Where the disk is in a frame",
+    title="The disk in a frame",
     caption="Frames of the film at W = 1.4 cm/s, as slow and as fast as the disk gets. Rings: the four "
     "marks; light blue: the disk and its "
     "centre; cross: the contact. The paper loses its marks in the blur; this tracker fits the blurred marks.",

@@ -59,11 +59,11 @@ def swing_period(model: Model, amplitude: Array) -> Array:
 @figure(
     "steady-clock",
     paper="Section 6, natural detuning",
-    title="A steady drive beside a periodic one",
+    title="A steady and a periodic drive",
     caption="(a) Amplitude of a pendulum from rest under a torque 5 % below its own frequency. Without "
     "friction it detunes and stays modulated; with friction it locks to the torque and repeats its clock. "
     "(b) Relative r.m.s. of the period of the DLE's figure-eight at w = 12, if the drive ripples by 1 % "
-    "or 5 %: at most about half of the ripple (dotted), and zero if the ripple is in step. (c) Period "
+    "or 5 %. It is at most about half of the ripple (dotted), and zero if the ripple is in step. (c) Period "
     "over the size of the swing, without friction: it grows for the plain pendulum and is constant with "
     "Huygens' cheeks.",
 )
@@ -128,7 +128,7 @@ def lengths(y: Array, z: Array) -> tuple[float, float]:
 @figure(
     "swing",
     paper="Section 6, the pumped swing",
-    title="The figure-eight beside a pumped swing",
+    title="The figure-eight and a pumped swing",
     caption="Path of the centre of mass over one period, arrows in the direction of motion; the cross is "
     "the contact or the pivot. (a) The DLE at w = 10. (b) A swing whose rider stands on the way out and "
     "squats on the way in. Both are shorter on the way out and longer on the way back; both have a curved "
