@@ -75,7 +75,7 @@ def test_a_search_takes_a_fit_that_is_near_its_minimum():
     assert model_error_schedule._nearly(alone, model_error_schedule.STEPS) is alone
     # Nor of a formula, whose constants may trade for each other for ever.
     assert model_error_schedule._nearly(unfinished, model_error_schedule.FEW) is unfinished
-    far = replace(done.point.bare(), states=done.states + np.array([0.0, 0.3]))
+    far = replace(done.point.without_cache(), states=done.states + np.array([0.0, 0.3]))
     away = replace(unfinished, point=far)
     assert (
         model_error_schedule._nearly(away, model_error_schedule.STEPS).chi2 < 1.01 * done.chi2

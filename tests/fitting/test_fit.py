@@ -258,7 +258,7 @@ def test_what_a_solve_left_counts_only_where_it_was_left():
     measured, _states = simulated.film(truth, np.random.default_rng(5), 8.0)
     record = record_of(measured, truth)
     fitted = fit_record(measured, record, truth)
-    left, bare = fitted.point, fitted.point.bare()
+    left, bare = fitted.point, fitted.point.without_cache()
     assert left.linear is not None
     assert pickle.loads(pickle.dumps(left)).linear is None
     assert udd.fit(measured, truth).point.linear is None

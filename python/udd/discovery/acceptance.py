@@ -116,7 +116,9 @@ def _chance(pair: Pair, trial: TrialFit, scores: ScoreRound) -> tuple[float, flo
     inflation = after.inflation(before)
     fall = (before.chi2 - after.chi2) / inflation
     # A film's faults add a non-central part to chi2.
-    return fall, min(float(ncx2.sf(fall, trial.freedom, after.faults / inflation)) * scores.comparisons, 1.0)
+    return fall, min(
+        float(ncx2.sf(fall, trial.freedom, after.film_error_chi2 / inflation)) * scores.comparisons, 1.0
+    )
 
 
 @dataclass(frozen=True)

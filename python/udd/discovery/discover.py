@@ -228,7 +228,7 @@ def discover(
     clock.finish("fitting the model as found")
     final = refit(end.whole)
     reported = eased(final) if final.scatter > UNEXPLAINED else final
-    reported = replace(reported, unit_doubt=base.unit_doubt).without_cache().doubted()
+    reported = replace(reported, unit_doubt=base.unit_doubt).without_cache().with_diagnostics()
     added = [
         replace(f, by_record=by_record(baseline, end.whole, f.effect, record_order)[0])
         for step in end.accepted
@@ -259,7 +259,7 @@ def discover(
     verdict = verdict_of(added, bool(end.unconfirmed), doubts, bool(open_form), bool(stopped))
     return Discovery(
         verdict=verdict,
-        baseline=baseline.without_cache().doubted() if added else reported,
+        baseline=baseline.without_cache().with_diagnostics() if added else reported,
         fit=reported,
         effects=added,
         alternatives=others,

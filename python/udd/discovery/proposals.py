@@ -103,7 +103,7 @@ class Proposals:
             [s.candidate for s in group]
             for group, fall in best
             if len({s.candidate.effect.name for s in group} - loose) == 2
-            and fall > self.scores.fit.faults
+            and fall > self.scores.fit.film_error_chi2
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
         return self._together(likely), number

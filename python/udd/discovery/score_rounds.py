@@ -56,12 +56,14 @@ class ScoreRound:
 
     def passing(self) -> list[Scored]:
         """Return usable candidates that neither chance nor a film's faults explain."""
-        faults = self.fit.faults
+        faults = self.fit.film_error_chi2
         return [s for s in self.usable() if s.p * self.comparisons < ALPHA and s.chi2 > faults]
 
     def passing_curves(self) -> list[Curve]:
         """Return curves that neither chance nor a film's faults explain."""
-        return [c for c in self.curves if c.p * self.comparisons < ALPHA and c.chi2 > self.fit.faults]
+        return [
+            c for c in self.curves if c.p * self.comparisons < ALPHA and c.chi2 > self.fit.film_error_chi2
+        ]
 
     def nats(self, scored: Scored) -> float:
         """Return a candidate's gain in nats minus its parameters' price, as a curve's evidence."""

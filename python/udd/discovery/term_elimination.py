@@ -338,7 +338,10 @@ class _Pruning:
         problem = replace(fitted.problem, free=free)
         try:
             return solve(
-                fitted.measurements, problem, replace(fitted.point.bare(), sets=tuple(sets)), iterations
+                fitted.measurements,
+                problem,
+                replace(fitted.point.without_cache(), sets=tuple(sets)),
+                iterations,
             )
         except FitError:
             return None

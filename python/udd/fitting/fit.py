@@ -154,7 +154,7 @@ def fit(
     (result,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
-    return result.without_cache().doubted()
+    return result.without_cache().with_diagnostics()
 
 
 def options_of(

@@ -101,7 +101,7 @@ class Point(OneLine):
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "linear": None}
 
-    def bare(self) -> Point:
+    def without_cache(self) -> Point:
         """Return the point without its linearisation."""
         return Point(self.states, self.sets)
 
@@ -241,17 +241,19 @@ class Fit(Drawable):
         return float((self.misfit_variance / sd**2)[self.record.observed].mean())
 
     @property
-    def faults(self) -> float:
+    def film_error_chi2(self) -> float:
         """Share of chi2 that a film's faults can explain if they follow the motion: 0 if noise hides them."""
         sd = self.noise.sd(self.record, self.states[:, 0])
         fault = np.array(self.model.profile.sensor.faults)
         return float(np.square(fault / sd, where=self.record.observed, out=np.zeros(sd.shape)).sum())
 
     put_away = renamed_attribute("put_away", "without_cache")
+    doubted = renamed_attribute("doubted", "with_diagnostics")
+    faults = renamed_attribute("faults", "film_error_chi2")
 
     def without_cache(self) -> Fit:
         """Return the fit without its solve's linearisation, which takes about 1.5 kB a frame."""
-        return replace(self, point=self.point.bare())
+        return replace(self, point=self.point.without_cache())
 
     def inflation(self, before: Fit) -> float:
         """Return the factor by which a decrease of chi2 from another fit is divided.
@@ -281,7 +283,7 @@ class Fit(Drawable):
 
         return doubts(self)
 
-    def doubted(self) -> Fit:
+    def with_diagnostics(self) -> Fit:
         """Return the fit with standard errors that include missing physics, see :class:`Diagnostics`."""
         factor = self.doubts.factor / self.widened
         if factor == 1.0:

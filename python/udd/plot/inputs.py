@@ -146,7 +146,7 @@ def first_film(fit: Any) -> Any:
         misfit_variance=fit.misfit_variance[:n],
         defect=fit.defect[: n - 1],
         noise=replace(fit.noise, weight=fit.noise.weight[:n]),
-        point=replace(fit.point.bare(), states=fit.point.states[:n], sets=fit.point.sets[:1]),
+        point=replace(fit.point.without_cache(), states=fit.point.states[:n], sets=fit.point.sets[:1]),
     )
 
 

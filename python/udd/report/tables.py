@@ -58,7 +58,7 @@ def _rows(
 ) -> list[dict[str, str]]:
     known = units(discovery.fit)
     # Numbers as of `udd fit`: their standard errors contain what the known model misses.
-    baseline = loosest(discovery.baseline).doubted() if discovery.effects else discovery.baseline
+    baseline = loosest(discovery.baseline).with_diagnostics() if discovery.effects else discovery.baseline
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
         unit, factor = small_unit(known[name]) if known[name] else share
