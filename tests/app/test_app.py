@@ -356,7 +356,7 @@ def test_which_names_a_server_goes_by() -> None:
         assert (guard.refusal(scope) is None) == fine
 
 
-# --- what the page is told, and its words
+# --- the catalogue and the texts
 
 
 def test_presets_run_and_have_words() -> None:

@@ -28,7 +28,7 @@ __all__ = ["client"]
 
 
 def ended(client: TestClient, job: str, seconds: float = 120.0) -> dict[str, Any]:
-    """What becomes of a job."""
+    """Return the last message of a job."""
     with client.websocket_connect(SOCKET) as socket:
         socket.send_json({"type": "watch", "job": job})
         until = time.monotonic() + seconds

@@ -28,7 +28,7 @@ ROWS = """(count) => {
 
 
 def shown(page: Any, count: int) -> tuple[dict[str, Any], np.ndarray]:
-    """What the page runs, and its first states to the bit."""
+    """Return the page's run, and its first states to the bit."""
     until(page, f"udd.player.records[0].count >= {count}")
     said = page.evaluate(ROWS, count)
     bits = np.array([int(b) for b in said["bits"]], dtype=np.uint64)

@@ -1,4 +1,4 @@
-"""What is asked before a file is sent: the drive speed, and what the columns of a table are."""
+"""Questions before a file is sent: the drive speed, and the columns of a table."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def failed(argv: list[object], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def data(argv: list[object], capsys: pytest.CaptureFixture[str]) -> dict[str, object]:
-    """What a command says to a machine."""
+    """Return the output of a command with `--json`."""
     assert main([*(str(a) for a in argv), "--json"]) == 0
     out, _ = capsys.readouterr()
     found: dict[str, object] = json.loads(out, parse_constant=lambda x: pytest.fail(f"{x} is not JSON"))
@@ -198,12 +198,12 @@ def test_discover_tells_the_verdict_first(
     assert out.startswith("effect ")
     assert "quadratic drag" in out
     assert "noise floor" in out
-    assert re.search(r"\n  A frame is good to: theta \d[\d.]* mrad", out)
+    assert re.search(r"\n  Noise of one frame: theta \d[\d.]* mrad", out)
     assert out.isascii()  # for terminals of every locale
     assert err == ""  # no progress where nobody watches
     written = page.read_text(encoding="utf-8")
     assert written.startswith("<!DOCTYPE html>")
-    assert re.search(r"A frame is good to: theta \d[\d.]* mrad", written)
+    assert re.search(r"Noise of one frame: theta \d[\d.]* mrad", written)
 
 
 def test_discover_as_json(swing: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -233,7 +233,7 @@ def test_a_record_is_held_out_by_its_name_or_number(
     assert found["held_out_records"] == [0]
     assert found["verdict"] == "effect identified" and len(found["effects"]) == 1
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "Whole records, by number 0, were held back." in page
+    assert "Whole records, by number 0, were not used for the fit." in page
     assert "b.csv" in page  # what is shown
 
     # It is what Python's is, and a number says the same.
@@ -552,7 +552,7 @@ def test_the_command_line_names_its_own_options(
 def test_messages_are_told_in_options() -> None:
     asked = in_options("say where the motion starts, state0={'v': ..., 'w': ...}")
     assert asked.endswith('"state0": {"v": ..., "w": ...} in the file of --model')
-    # What a user wrote is repeated as it was written, and parameters may be called so.
+    # A user's text is repeated unchanged; parameters may have these names.
     for text in ("--effect drag:rate=x: 'rate=x' is not", "rate must be finite", "part must not be below 0"):
         assert in_options(text) == text
 

@@ -83,7 +83,7 @@ def test_a_command_of_the_page_is_understood(
 
 
 def test_a_pipe_gets_a_first_line_within_a_second_and_then_more(folder: Path) -> None:
-    """Of the command's own time: Python starts before, however busy the machine is."""
+    """Only the command's time counts: the start of Python depends on the load of the machine."""
     code = """
 import sys, time
 from udd.cli import main, output

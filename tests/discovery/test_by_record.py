@@ -57,7 +57,7 @@ def test_what_all_records_want_is_found_and_confirmed_on_one_that_no_fit_saw(tmp
     result.report(tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.index("Supported by all records: abs(v)*v in v") < page.index("<img")
-    assert "Whole records, by number 1, were held back." in page
+    assert "Whole records, by number 1, were not used for the fit." in page
 
 
 @pytest.mark.nightly

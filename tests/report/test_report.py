@@ -25,12 +25,13 @@ from udd.fitting.innovations import innovations
 from udd.fitting.parameter_meanings import meaning
 from udd.report import runs, tables
 from udd.report import wording as words
+from udd.report.discovery_report import head as head_of
 
 _VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
 class Page(HTMLParser):
-    """What is on a page: its tags, nested as they are, and its text."""
+    """A page: its tags, nested as they are, and its text."""
 
     def __init__(self, source: str) -> None:
         super().__init__()
@@ -100,26 +101,26 @@ def test_the_page_can_be_read_aloud(pages: dict[str, str], name: str) -> None:
     ("ratio", "witness", "told"),
     [
         ((0.9, 0.85, 0.95), "held", "interval 0.85 to 0.95)."),
-        ((0.99, 0.97, 1.01), "fitted", "fitted too, they lowered"),
-        ((1.005, 1.001, 1.008), "halves", "Each half of the record"),
-        ((0.99, 0.97, 1.01), "halves", "Each half of the record"),
+        ((0.99, 0.97, 1.01), "fitted", "in a fit that includes them, χ² decreased"),
+        ((1.005, 1.001, 1.008), "halves", "In each half of the record"),
+        ((0.99, 0.97, 1.01), "halves", "In each half of the record"),
     ],
 )
-def test_what_the_frames_held_back_say_is_told(
+def test_the_held_out_frames_are_described(
     ratio: tuple[float, float, float], witness: Literal["held", "fitted", "halves"], told: str
 ) -> None:
     (effect,) = discovered.disk().effects
     assert told in words.confirmed_by(replace(effect, ratio=ratio, witness=witness))
 
 
-def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:
+def test_an_effect_has_words_and_numbers(pages: dict[str, str]) -> None:
     found, text = discovered.disk(), Page(pages["disk"]).words
     (effect,) = found.effects
     assert effect.effect.meaning[1:] in text
     assert words.with_error(effect.parameters["b"], effect.errors["b"]) in text
     for h in found.error_before.horizons:
         assert words.length(found.error_after.at(h)[0], "m") in text
-    else_ = text[text.rindex("What else it could be") : text.rindex("What these data cannot say")]
+    else_ = text[text.rindex("Alternatives") : text.rindex("Limits of these data")]
     assert "Slip c Z" in else_
     assert "film a second drive" in text
     assert "camera turned clockwise" in text
@@ -127,15 +128,15 @@ def test_an_effect_is_told_in_words_and_numbers(pages: dict[str, str]) -> None:
 
 
 def test_the_page_follows_the_reader(pages: dict[str, str]) -> None:
-    """What was measured, how well the model does and where it fails, what was added, what else, how again."""
+    """The sections: motion, errors, residuals, added effect, alternatives, limits, numbers, command."""
     heads = re.findall(r"<h2>(.*?)</h2>", pages["disk"])
     assert heads == [
-        "What was measured",
+        "The measured motion",
         "The error, before and after",
         "Where the known model fails",
-        "What was added, and why",
-        "What else it could be",
-        "What these data cannot say",
+        "The added effect, and why",
+        "Alternatives",
+        "Limits of these data",
         "The numbers",
         "To do it again",
     ]
@@ -197,7 +198,7 @@ def test_noise_that_no_measurement_stated_is_not_said_to_be_stated(pages: dict[s
 def test_nothing_missing_is_said(pages: dict[str, str]) -> None:
     text = Page(pages["nothing"]).words
     assert "Nothing is missing" in text
-    assert "nothing missing means nothing that these data demand" in text
+    assert "“nothing missing” means that these data need no further effect" in text
     assert "with the effect" not in text
 
 
@@ -213,7 +214,7 @@ def test_a_model_that_does_not_explain_is_not_called_complete() -> None:
 def test_a_pendulum_has_its_page(pages: dict[str, str]) -> None:
     text = Page(pages["pendulum"]).words
     assert "The air resists with the square of the speed" in text
-    assert "What the model of the pendulum lacks" in text
+    assert "Effects that the model of the pendulum lacks" in text
     assert "mrad" in text
 
 
@@ -331,6 +332,23 @@ def test_contents_guide_and_data_are_on_the_page(pages: dict[str, str]) -> None:
     assert tables and all(one["href"].startswith("data:text/csv") for one in tables)
     for puzzle in ("still there in the next", "over none [nats]", "a 24th of"):
         assert puzzle not in source
+
+
+def test_effects_that_act_identically_have_equal_bars() -> None:
+    from udd.plot.evidence import decreases
+
+    found = discovered.disk()
+    (effect,) = found.effects
+    alike = [other.title for other in found.alternatives if other.likeness > words.IDENTICAL]
+    assert alike
+    assert {decreases(found, 0)[title] for title in alike} == {effect.chi2}
+
+
+def test_the_origin_of_a_film_is_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, origin = discovered.disk(), "This film was rendered <here>."
+    rendered = found.measurement.with_meta(origin=origin)
+    monkeypatch.setattr(type(found), "measurement", property(lambda _: rendered))
+    assert origin in [str(note.text) for note in head_of(found, "", []).notes]
 
 
 def test_errors_of_the_known_model_contain_what_it_lacks() -> None:

@@ -40,7 +40,7 @@ def test_the_page_holds_all_and_stands_alone(film: Path, found: Tracking, tmp_pa
     page(film, found, tmp_path / "page.html", command="udd track run.mp4 --page page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>") and "97 of 99 frames" in text
-    for said in ("What was found", "The camera and the device", "How each frame did", "Does it roll?", "±"):
+    for said in ("Positions", "The camera and the device", "How each frame did", "Does it roll?", "±"):
         assert said in text
     for item in found.measurement.meta["calibration"]:
         assert f'<th scope="row">{item}</th>' in text

@@ -21,8 +21,8 @@ from .calculator import LENGTH
 from .interruption import SpentError, StoppedError
 from .shared_answers import SharedAnswers
 
-_GRACE = 0.5  # s in which a process must have stopped its work
-_LOOK_EVERY = 0.1  # s between two looks whether a question that waits may push another out
+_GRACE = 0.5  # s within which a process must stop its work
+_LOOK_EVERY = 0.1  # s between two checks for a waiting question
 _LONG = 0.5  # s that a question runs before another process is started for those that wait
 
 

@@ -1,7 +1,7 @@
-"""Connections that cost the server little, whatever comes through them, before any token was shown.
+"""Limits on connections before any token was shown.
 
-uvicorn limits how long a connection may be idle between two requests, but not how long the head of a request
-may take, nor how many connections there are.
+uvicorn limits the idle time between two requests. It limits neither the time for the head of a request nor
+the number of connections.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _logger = logging.getLogger("uvicorn.error")
 class Connection(H11Protocol):
     """A connection that is closed if it makes the server wait.
 
-    It waits for the head of a request from when it is made or has answered until the head is complete, and
-    for the visitor to read while the answer stands in its buffer. Both end after `limits.PAUSE`, however many
-    bytes trickle meanwhile. If there are too many connections, those that have waited longest are closed.
+    The server waits for the head of a request to be complete, and for the visitor to read the answer. Each
+    wait ends after `limits.PAUSE`, even if single bytes still arrive. If there are too many connections, the
+    server closes those that have waited longest.
     """
 
     _deadline: asyncio.TimerHandle | None = None

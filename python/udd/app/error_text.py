@@ -1,4 +1,4 @@
-"""Sentences for a person who is told that something does not work."""
+"""Error messages as sentences for the page."""
 
 from __future__ import annotations
 

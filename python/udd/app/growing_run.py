@@ -24,23 +24,23 @@ _FIRST = 4.0  # s of the first call
 
 
 def clock_of(model: Model) -> float:
-    """How much of the model's time passes in a second."""
+    """Return the model's time that passes in a second on the page."""
     return page_model(model).clock
 
 
 def per_unit(model: Model) -> float:
-    """States shown in a unit of the model's time: 240 of a disk, 64 of the DLE."""
+    """Return the number of shown states in a unit of the model's time: 240 for a disk, 64 for the DLE."""
     return RATE / clock_of(model)
 
 
 def times_of(model: Model, count: int) -> Array:
-    """The times at which states are shown."""
+    """Return the times of the shown states."""
     result: Array = np.arange(count) / per_unit(model)
     return result
 
 
 def columns_of(model: Model) -> list[str]:
-    """The columns of a run's table: the state, then what is drawn or plotted with it."""
+    """Return the columns of a run's table: the state, then quantities to draw and plot."""
     return [*model.state_names, page_model(model).drawn, "friction", "friction_work", "effects_work"]
 
 
@@ -87,11 +87,11 @@ def grown(start: Start, count: int) -> Grown:
 class Run:
     """States on a fixed grid of times, as one call of `udd.simulate` over a longer time gives them.
 
-    A call's last step is cut to end at the last time, which moves the last few states by rounding. So only
-    the first half of a call's states is used, and the next call repeats them bit by bit. (Steps are far
-    shorter than half a call: friction bounds them at about a second.)
+    A call cuts its last step to end at the last time, which changes the last few states by rounding. So only
+    the first half of a call's states is used, and the next call repeats them bit by bit. Steps are far
+    shorter than half a call, since friction bounds them at about a second.
 
-    The run ends as "spent" where the next call would take more than `limits.STEPS` steps.
+    The run ends as "spent" if the next call would take more than `limits.STEPS` steps.
     """
 
     def __init__(self, start: Start) -> None:

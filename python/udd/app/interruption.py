@@ -71,7 +71,7 @@ class Interruptible:
             watch.join()
 
     def stop(self, reason: BaseException) -> None:
-        """Make the work raise the reason; called from another thread. An idle process ignores it."""
+        """Make the work raise the reason; called from another thread. Without work, do nothing."""
         self._reason = reason
         _thread.interrupt_main()
 

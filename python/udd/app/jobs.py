@@ -26,16 +26,16 @@ ENDED = ("done", "failed", "cancelled")
 
 @dataclass
 class Job:
-    """A job and what became of it.
+    """A job and its state.
 
     Attributes
     ----------
     asked : dict
-        What the process is told.
+        The question to the process.
     state : str
         ``"waiting"``, ``"running"``, ``"done"``, ``"failed"`` or ``"cancelled"``.
     stages : list of str
-        What it said it was doing, in order.
+        Its reports of progress, in order.
     answer : dict
         Its result, or ``{"error": sentence}``.
     """
@@ -51,7 +51,7 @@ class Job:
     killed: bool = False
 
     def said(self) -> dict[str, Any]:
-        """All that is known of it."""
+        """Return its state as a message for pages."""
         return {
             "type": "job",
             "job": self.id,
@@ -62,7 +62,7 @@ class Job:
         }
 
     def tell(self) -> None:
-        """Tell those who watch."""
+        """Send its state to the pages that watch it."""
         for send in list(self.watchers):
             send(self.said())
 

@@ -18,20 +18,20 @@ class PageModel:
     Attributes
     ----------
     ranges : dict
-        Of each parameter's slider the least, the greatest and the step, and by what the SI value is
-        multiplied for the reader in which unit.
+        For each parameter: least value, greatest value and step of its slider; factor from SI to the shown
+        unit, and that unit.
     surfaces : dict
         The sections that the page offers, and the component that its return map shows.
     exponent : tuple of (float, float)
         The time of a run for an exponent, and the error that is enough.
     third : tuple of float
-        A start of a diagram, beside the page's and its mirror image.
+        A further start of a diagram; the others are the page's and its mirror image.
     metres : float
         The unit of length of its states.
     clock : float
-        How much of the model's time passes in a second.
+        The model's time that passes in a second.
     drawn : str
-        What is told beside the state, to draw it.
+        The quantity that is sent with the state, to draw it.
     """
 
     ranges: dict[str, tuple[float, float, float, float, str]]

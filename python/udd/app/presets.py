@@ -1,4 +1,4 @@
-"""What the page can offer: parameters with units and ranges, effects, presets.
+"""The catalogue of the page: parameters with units and ranges, effects, presets.
 
 Their words are in static/texts.*.json.
 """

@@ -1,4 +1,4 @@
-"""A discovery as the page says it: the verdict and the numbers that it rests on."""
+"""A discovery as the page shows it: the verdict and its numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .spec import model_of
 
 
 def of(found: Any) -> dict[str, Any]:
-    """What stands at the top of the result."""
+    """Return the top of the result: the verdict and its numbers."""
     numbers = wording.headline(found)
     return {
         "verdict": found.verdict,

@@ -1,4 +1,4 @@
-"""Who may speak to the server: the page that it served itself, to those who know the token."""
+"""Access control: only pages of this server, and only with the token."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 OPEN = ("/static/",)
-"""What anybody may read: files that ship with the package."""
+"""Paths without a token: files that ship with the package."""
 
 _POLICY = (
     "default-src 'self'; img-src 'self' blob: data:; object-src 'none'; base-uri 'none'; form-action 'none'; "

@@ -171,12 +171,12 @@ async def _while_there(request: Request, work: Coroutine[Any, Any, Any]) -> Any:
 
 
 def new_token() -> str:
-    """What only those know who were given the link."""
+    """Return a new secret for the link."""
     return secrets.token_urlsafe(24)
 
 
 async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
-    """What a job is told, with its file in its folder."""
+    """Return the question to a job; its file is put into its folder."""
     known = {name: value for name in ("W", "R", "length") if (value := _number(request, name)) is not None}
     if kind == "film":
         declared = request.headers.get("content-length", "0")
@@ -191,7 +191,14 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
 
         with as_file(files("udd") / "demo" / "sample.mp4") as sample:
             shutil.copyfile(sample, folder / "sample.mp4")
-        return {"kind": "loop", "file": "sample.mp4", "film": True, "W": pipeline.W, "R": pipeline.R}
+        return {
+            "kind": "loop",
+            "file": "sample.mp4",
+            "film": True,
+            "W": pipeline.W,
+            "R": pipeline.R,
+            "origin": pipeline.ORIGIN,
+        }
     if kind == "render":
         start = parsed("the run", await uploads.text(request.stream()))
         seconds = _number(request, "seconds") or 0.0

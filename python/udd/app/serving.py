@@ -25,11 +25,11 @@ def serve(
     Parameters
     ----------
     host, port : str, int
-        Where; port 0 is any that is free.
+        Address and port; port 0 is any free one.
     fragment : str
-        The run that the browser is opened with, as the page's links hold it.
+        The run to open with: the part of a link after #.
     browser : bool
-        Whether to open one.
+        Whether to open a browser.
     ready : callable
         Called with the link once the server listens.
     classroom : bool
@@ -64,7 +64,7 @@ def serve(
 
 
 def hosts_of(host: str, port: int) -> tuple[list[str], bool]:
-    """What a browser may call this server, and whether any address will do."""
+    """Return the names that a browser may use for this server, and whether it may use any address."""
     bracketed = f"[{host}]" if ":" in host else host
     any_address = host in ("0.0.0.0", "::")
     if any_address:

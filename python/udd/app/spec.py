@@ -1,4 +1,4 @@
-"""What the page asks for, checked: models and states from JSON."""
+"""Models and states from the page's JSON, checked."""
 
 from __future__ import annotations
 

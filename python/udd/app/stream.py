@@ -30,7 +30,7 @@ _WAITING = 64  # messages that a page may be behind
 
 
 class Page:
-    """What one connected page has asked for."""
+    """The open questions of one connected page."""
 
     def __init__(self, socket: WebSocket, jobs: Jobs, calculators: Mapping[str, Calculators]) -> None:
         self._socket = socket

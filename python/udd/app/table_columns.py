@@ -57,7 +57,7 @@ def _usual_unit(table: Table, k: int, role: str) -> str:
 
 
 def _kind(path: Path) -> str:
-    """What the table is without a word: "disk", "pendulum", "gyroscope", or nothing."""
+    """Return what the table is read as by default: "disk", "pendulum", "gyroscope", or ""."""
     try:
         return read_measurement(path).kind
     except UddError:

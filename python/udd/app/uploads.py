@@ -1,4 +1,4 @@
-"""What is sent to the server, into a private folder, and no more than fits."""
+"""Uploads: into a private folder, within the limits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def private_folder(parent: Path) -> Path:
 
 
 async def text(chunks: AsyncIterator[bytes]) -> str:
-    """What comes, as text, of which no more is taken than a message may have.
+    """Read a request's body as text, up to the length of a message.
 
     Raises
     ------

@@ -1,9 +1,8 @@
 """A job, in a process of its own: `python -m udd.app.worker` in a private folder.
 
-What it is asked comes as one line of JSON on its input; what it says goes out as lines of JSON:
-``{"say": text}``, ``{"frame": {...}, "jpeg": base64}``, and at the end ``{"done": {...}}`` or
-``{"error": sentence}``. Its memory and CPU time are limited, and a film that FFmpeg stumbles over takes only
-this process along.
+The question comes as one line of JSON on its input. Answers are lines of JSON: ``{"say": text}``,
+``{"frame": {...}, "jpeg": base64}``, and at the end ``{"done": {...}}`` or ``{"error": sentence}``. Its
+memory and CPU time are limited. A film that crashes FFmpeg ends only this process.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ def _kept() -> list[dict[str, str]]:
 
 
 def _sentence(error: object, file: str) -> str:
-    """What is wrong, without the name that the file has here."""
+    """Return the message without the file's name on the server."""
     text = str(error)
     if file:
         text = text.removeprefix(f"{file}: ").replace(file, "the file")
@@ -84,7 +83,7 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     from .table_columns import measurement_of
 
-    file, known = Path(asked["file"]), {k: asked[k] for k in ("W", "R") if asked.get(k) is not None}
+    file, known = Path(asked["file"]), {k: asked[k] for k in ("W", "R", "origin") if asked.get(k) is not None}
     film = asked["film"]
     tell({"say": "reading the film" if film else "reading the table"})
     if film:

@@ -31,7 +31,7 @@ def add(commands: Any) -> None:
         "link",
         nargs="?",
         metavar="LINK",
-        help="a link that the page gave, or what stands in it after #: opens with that run",
+        help="a link copied from the page, or its part after #: the page opens with that run",
     )
     parser.add_argument(
         "--host",

@@ -12,7 +12,7 @@ from .output import CommandResult, shown_progress
 
 def add(commands: Any) -> None:
     """Add the command."""
-    summary = "Track the sample film, find what the model lacks, and write the page that says so."
+    summary = "Track the sample film, find the effect that the model lacks, and write the report."
     parser = new(
         commands,
         "demo",
@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default ./demo)"
     )
-    parser.add_argument("--null", action="store_true", help="the film of a disk that lacks nothing")
+    parser.add_argument("--null", action="store_true", help="the film of a disk without any effect")
 
 
 def run(args: argparse.Namespace) -> CommandResult:
@@ -35,8 +35,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     from udd.report import as_text, summary_of
 
     made = demo(args.out, null=args.null, progress=shown_progress())
-    rendered = "This film was rendered from a simulated disk, not filmed."
     verdict = as_text(summary_of(made.discovery))
-    text = f"{verdict}\n{rendered}\nmeasurement: {made.measurement}\nreport: {made.report}"
+    text = f"{verdict}\nmeasurement: {made.measurement}\nreport: {made.report}"
     data = {"measurement": made.measurement, "report": made.report, **made.discovery.to_dict()}
     return CommandResult(text, data)

@@ -92,9 +92,11 @@ def held_out_of(args: argparse.Namespace) -> list[int] | None:
     if args.held_out is None:
         return None
     if args.each is not None:
-        raise UddError("--held-out does not go with --each: nothing would say what only a file held out has")
+        raise UddError(
+            "--held-out does not go with --each: the parameters of a held-out file would be undetermined"
+        )
     if len(args.files) == 1:
-        raise UddError("--held-out takes several files: of one its last part is held out")
+        raise UddError("--held-out needs several files; in one file the last part serves as held-out data")
     names = [str(file) for file in args.files]
     numbers = {str(k): k for k in range(len(names))} | {name: k for k, name in enumerate(names)}
     held_out = set()

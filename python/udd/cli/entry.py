@@ -17,7 +17,7 @@ from .option_names import in_options
 from .output import CommandResult, speaking
 from .parser import make_parser
 
-# What need not be installed: the extra that brings it, and who needs it.
+# Optional packages: the extra that installs each, and its users.
 _EXTRAS = {
     "av": ("track", "films need"),
     "cv2": ("track", "films need"),

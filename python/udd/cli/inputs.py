@@ -53,7 +53,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         help='a model of your own, as JSON or TOML: {"states": ["x", "v"], "equations": {"x": "v", "v": '
         '"-k*x"}, "parameters": {"k": 1.0}, "angles": []}; or, of a mechanism M q\'\' = f, {"mechanism": '
         '{"coordinates": {"x": "v"}, "mass": [["m"]], "forces": ["-k*x"]}, "parameters": {"m": 2.0, "k": '
-        '1.0}}; "state0": {"v": 0.1} beside them says where a state starts that is not seen',
+        '1.0}}; "state0": {"v": 0.1} next to them gives the start of an unobserved state',
     )
     add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
     add_pendulum(parser, "pivot to centre of mass [m] (wins over the file's header)")
@@ -139,7 +139,7 @@ def is_film(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the files hold: the measurements, the models with what their headers say, the films among them."""
+    """The contents of the files: measurements, models with the values of their headers, and films."""
 
     files: list[Path]
     measurements: list[Measurement]
@@ -155,7 +155,7 @@ class Inputs:
 
     @property
     def told(self) -> dict[str, Any]:
-        """What `--json` says of them."""
+        """The files in the output of `--json`."""
         return {"file": self.files[0] if len(self.files) == 1 else self.files}
 
 
@@ -247,12 +247,12 @@ def _gyroscope(args: argparse.Namespace, limit: dict[str, float]) -> Measurement
 
 
 def add_partial(parser: argparse.ArgumentParser) -> None:
-    """What to do with a film that is cut off."""
-    parser.add_argument("--partial", action="store_true", help="use what there is of a film that is cut off")
+    """Add the option for a truncated film."""
+    parser.add_argument("--partial", action="store_true", help="use the first part of a truncated film")
 
 
 def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measurement:
-    """What `measure` makes of a film; one that is cut off is refused, unless its user knows."""
+    """Measure a film; refuse a truncated one without `--partial`."""
     with warnings.catch_warnings(record=True) as said:
         found = measure()
     missing = int(found.meta.get("frames_missing", 0))
@@ -333,7 +333,7 @@ def start_of(args: argparse.Namespace) -> Any:
 
 
 def _own(args: argparse.Namespace) -> dict[str, Any]:
-    """What the file of the user's own model holds."""
+    """Read the file of `--model`."""
     from udd._util.tables import read, table
 
     toml = args.model.suffix.lower() == ".toml"

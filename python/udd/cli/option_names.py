@@ -1,4 +1,4 @@
-"""What the package's functions call an argument, and which option of the command line says it."""
+"""Options of the command line for the arguments of the package's functions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OPTIONS = {
     "limit": "--limit",
 }
 
-# A word of a sentence: what a user wrote of a parameter with such a name, "--effect x:rate=1", is left alone.
+# A word of a sentence. An effect's parameter with such a name, as in "--effect x:rate=1", stays unchanged.
 _NAME = f"(?<![^\\s(])({'|'.join(OPTIONS)})"
 _ONE_COLUMN = re.compile(rf"{_NAME}=\{{'(\w+)': \.\.\.\}}")
 _TEXT = re.compile(rf'{_NAME}="([^"]*)"')
@@ -26,7 +26,7 @@ _START = re.compile(r"state0=\{([^}]*)\}")
 
 
 def in_options(message: str) -> str:
-    """A message about a table or a fit with options in the place of Python's arguments.
+    """Replace Python's arguments in a message by options of the command line.
 
     Examples
     --------

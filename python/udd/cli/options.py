@@ -184,7 +184,7 @@ def names(texts: list[str]) -> list[str]:
 
 
 def numbers(texts: list[str], what: str) -> list[float]:
-    """Return numbers that stand in several texts, or in a single text with commas between them.
+    """Read numbers from several texts, or from a single text with commas between them.
 
     Raises
     ------

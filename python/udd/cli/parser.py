@@ -83,7 +83,7 @@ def make_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"udd {version_of('udd')}")
-    # The list of commands stands in the groups below.
+    # The groups below list the commands.
     commands = parser.add_subparsers(
         metavar="COMMAND", required=True, help=argparse.SUPPRESS, parser_class=Parser, prog="udd"
     )

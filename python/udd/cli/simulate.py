@@ -54,7 +54,7 @@ def add(commands: Any) -> None:
 
 
 def add_run(parser: argparse.ArgumentParser, unit: str = "s") -> None:
-    """What a run of the disk takes."""
+    """Add the options of a run of the disk."""
     add_disk(parser, "drive speed [m/s]")
     parser.add_argument("--t", type=float, default=60.0, help=f"length of the run [{unit}] (default 60)")
     parser.add_argument(

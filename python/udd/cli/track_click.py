@@ -12,7 +12,7 @@ from udd.errors import UddError
 from .output import is_terminal
 
 _HEAD = """Clicked in {film}, by udd track --click; to be edited, and used again with --config.
-What has a standard error in [sigma] is a beginning, which the film improves."""
+Values with a standard error in [sigma] are first guesses, which the film improves."""
 
 
 def check(args: argparse.Namespace) -> None:
@@ -38,9 +38,9 @@ def check(args: argparse.Namespace) -> None:
 
 
 def clicked(args: argparse.Namespace, options: dict[str, Any]) -> tuple[dict[str, Any], str, dict[str, Any]]:
-    """The options with what was clicked, a line that says where it is written, and the same as data.
+    """Ask for clicks; return the completed options, a line with the file's name, and the same as data.
 
-    What the options and the config say is not asked for, and is written down with the rest.
+    Values of the options and the config are not asked for; they are written down with the rest.
     """
     from udd.tracking import click, write_config
     from udd.tracking.calibration.config import as_said

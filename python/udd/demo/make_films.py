@@ -1,7 +1,7 @@
 """How the sample films were made: ``python -m udd.demo.make_films`` makes them again.
 
 Two films of the same device, camera and drive. In `sample.mp4` the rolling constraint is relaxed, which the
-demonstration is not told; in `sample_null.mp4` nothing is added to the model.
+known model of the demonstration lacks; in `sample_null.mp4` nothing is added to the model.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The whole way, from the sample film to the page."""
+"""The demonstration: from the sample film to the report."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from udd.discovery import Discovery, discover
 from udd.models import Disk
 from udd.tracking import track
 
-#: What the user of the device knows: the speed at which the wheels run, and the size of the disk.
+#: Known to the user of the device: the speed of the wheels [m/s], and the radius of the disk [m].
 W = 0.042
 R = 0.08
+#: Stands in the header of the measured table, on the page and in the report.
+ORIGIN = "This film was rendered from a simulated disk, not filmed."
 
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demonstration made."""
+    """Results of the demonstration."""
 
     discovery: Discovery
     measurement: Path
@@ -34,14 +36,14 @@ def demo(
     null: bool = False,
     progress: bool | Callable[[str], object] | None = None,
 ) -> Demo:
-    """Track the sample film, find what the model lacks, write the measurement and the page.
+    """Track the sample film, find the missing effect, and write the measurement and the report.
 
     Parameters
     ----------
     out : path
-        Folder to write to; made if it is not there.
+        Folder to write to; it is created if needed.
     null : bool
-        Take the film of a disk that lacks nothing.
+        Take the film of a disk without any effect.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.
@@ -59,7 +61,7 @@ def demo(
     stem = "_null" if null else ""
     table, page = folder / f"measurement{stem}.csv", folder / f"report{stem}.html"
     with as_file(files("udd") / "demo" / f"{name}.mp4") as film:
-        measurement = track(film, disk_radius=R, progress=progress).with_meta(W=W)
+        measurement = track(film, disk_radius=R, progress=progress).with_meta(W=W, origin=ORIGIN)
         measurement.to_csv(table)
         with status(progress) as tell:
             found = discover(measurement, Disk(W, R=R), progress=tell)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def bifurcation(
     result: xr.Dataset, ax: Axes | None = None, *, component: str | None = None, colour: str | None = None
 ) -> Axes:
-    """Section points over the parameter; stretches with hysteresis are shaded.
+    """Draw section points over the parameter; stretches with hysteresis are shaded.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def bifurcation(
         Of :func:`udd.bifurcation`.
     ax : Axes, optional
     component : str, optional
-        Which component of the state; by default the first that is not the same everywhere.
+        The component of the state; by default the first that varies.
     colour : {"path", "attractor"}, optional
-        What the colours tell; by default the way up from the way down, and otherwise nothing.
+        Colour by direction of the sweep or by attractor; by default by direction if there are two.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def bifurcation(
     if colour not in (None, "path", "attractor"):
         raise UddError(f'colour must be "path" or "attractor", not {colour!r}')
     if colour == "attractor" and "attractor" not in result:
-        raise UddError("the attractors of this diagram have not been told apart")
+        raise UddError("the attractors of this diagram were not distinguished")
     points = result[name].transpose("path", "start", parameter, "point").to_numpy()
     x = np.broadcast_to(result[parameter].to_numpy()[:, None], points.shape[2:])
     words, unit, factor = _axis(result, name)
@@ -87,9 +87,9 @@ def bifurcation(
 
 @checked_arguments(error=UddError)
 def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Which initial states end where: a colour for each attractor, greys for what ends on none.
+    """Draw the basins of attraction: a colour for each attractor, greys for other ends.
 
-    What was not run, as starts off the wheels, is white.
+    Starts that were not run, such as those off the wheels, are white.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _half_step(values: NDArray[np.float64], first: float, last: float) -> tuple[
 def _layers(
     result: xr.Dataset, points: NDArray[np.float64], colour: str | None
 ) -> list[tuple[str, str | None, NDArray[np.bool_]]]:
-    """What is drawn in one colour: the colour, its name in the legend, and which points."""
+    """List the colours: each with its name in the legend and a mask of its points."""
     seen = np.isfinite(points)
     paths = [str(name) for name in result["path"].to_numpy()]
     if colour is None:

@@ -134,7 +134,7 @@ def _dots(ax: Axes, x: NDArray[Any], y: NDArray[Any], shade: str, said: str | No
 
 
 def _components(result: Section) -> tuple[str, str]:
-    """Two components that vary, angles that turn only where there is nothing else."""
+    """Choose two components that vary; rotating angles come last."""
     names = sorted(result.model.state_names, key=lambda name: name in _TURNING)
     varied = []
     for name in names:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: What a curve adds to, its unit, and by what its SI value is multiplied.
+#: By slot: the quantity that a curve adds to, its unit, and the factor from SI.
 _SLOTS: dict[str, tuple[str, str, float]] = {
     "torque": ("torque", "cm²/s²", 1e4),
     "friction": ("friction coefficient", "cm²/s", 1e4),
@@ -37,10 +37,10 @@ _ACROSS = 60  # along each coordinate of a surface
 
 @checked_arguments(error=UddError)
 def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -> Axes:
-    """What an equation lacks as a function of a coordinate, with a band that holds it with 95 %.
+    """Draw the missing term of an equation as a function of a coordinate, with its 95 % band.
 
-    The band is drawn where the record has been; how often it was where, the marks at the bottom say. A
-    surface is drawn in colours, with the places of the record; within the hatched parts it may be zero.
+    The band covers the range of the record; marks at the bottom show how often the record visits each place.
+    A surface is drawn in colours, with the places of the record; within the hatched parts it may be zero.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
         Of one coordinate, or of two.
     ax : Axes, optional
     formulas : sequence of Formula
-        Drawn beside it, three at most, each with as much of what the model's own parameters can do.
+        At most three, drawn for comparison; each may use the model's other parameters to the same degree.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def _axis(name: str) -> tuple[str, float]:
 
 
 def _value(curve: Any) -> tuple[str, float]:
-    """What a curve adds to, with its unit, and by what its SI value is multiplied."""
+    """Return the label of the quantity that a curve adds to, and the factor from SI."""
     slot, unit, up = _SLOTS.get(curve.slot.name, (curve.slot.name, "", 1.0))
     return f"{slot} [{unit}]" if unit else slot, up
 

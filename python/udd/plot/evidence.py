@@ -1,4 +1,4 @@
-"""What a discovery rests on: the evidence for each candidate, and the errors before and after."""
+"""The evidence of a discovery for each candidate, and the errors before and after."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
         kind, colour = (
             ("found", AFTER)
             if title in chosen
-            else ("cannot be told apart from it", ALIKE)
+            else ("cannot be distinguished from it", ALIKE)
             if title in alike
             else ("unphysical sign", "white")
             if not scored.physical
@@ -89,8 +89,21 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
 
 
 def decreases(discovery: Any, stage: int) -> dict[str, float]:
-    """The decrease in chi2 with the effect that was added after a search, by its name as a candidate."""
-    return {effect.tried or effect.title: effect.chi2 for effect in discovery.effects[stage : stage + 1]}
+    """Return the decrease in chi2 with the effect that a search added, by the name of the candidate.
+
+    Effects that act identically on these data have the same decrease.
+    """
+    from udd.discovery.thresholds import SAME
+
+    result = {}
+    for effect in discovery.effects[stage : stage + 1]:
+        result[effect.tried or effect.title] = effect.chi2
+        result |= {
+            other.title: effect.chi2
+            for other in discovery.alternatives
+            if other.likeness > SAME and other.instead_of == effect.effect.name
+        }
+    return result
 
 
 def threshold(discovery: Any, stage: int) -> float:
@@ -148,7 +161,7 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     ax.yaxis.set_major_locator(
         LogLocator(subs=(1.0, 2.0, 5.0) if high > 8 * low else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
     )
-    ax.set_xlabel("time since the model was let go [s]")
+    ax.set_xlabel("forecast horizon [s]")
     ax.set_ylabel(f"median error [{unit}]")
     legend_above(ax)
     tidy(ax)

@@ -1,4 +1,4 @@
-"""What a fit leaves over: of each equation, and of each thing that was seen."""
+"""Residuals of a fit: of each equation and of each observed channel."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def residuals(
     against: str | None = None,
     colour: str = AFTER,
 ) -> Axes:
-    """The residual of one equation, frame by frame, with its mean along a coordinate.
+    """Draw the residual of one equation, frame by frame, with its mean along a coordinate.
 
-    It is by how much each fitted state misses what the model makes of the one before, per second. Where the
-    model is right it is noise about zero, whatever it is drawn against.
+    The residual is the fitted state minus the model's prediction from the state before, per second. If the
+    model is right, the residual is noise about zero along every coordinate.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def residuals(
 
 @checked_arguments(error=UddError)
 def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> Axes:
-    """What was seen less what was fitted, against time, with a band of two standard deviations of the noise.
+    """Draw measured minus fitted values over time, with a band of two standard deviations of the noise.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
 
     Notes
     -----
-    Of several measurements that were fitted together the first is drawn.
+    If several measurements were fitted together, the first is drawn.
     """
     require_fit(fit)
     fit = first_film(fit)
@@ -159,7 +159,7 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
 
 
 def coordinates(fit: Any) -> dict[str, Array]:
-    """What a residual can be drawn against, at the frame that each flow starts from."""
+    """Return the coordinates of a residual, at the frame from which each flow starts."""
     columns = dict(zip(fit.model.state_names, fit.states[:-1].T, strict=True))
     result = {"t": fit.record.clock[:-1], **columns}
     if "beta" in columns:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
     from numpy.typing import ArrayLike, NDArray
 
-#: Of the paper's device [m]: the wheels' radius, the width of the wider rim, the disk's thickness.
+#: The paper's device [m]: radius of the wheels, width of the wider rim, thickness of the disk.
 WHEEL, FLAT, THICKNESS = 0.03, 0.013, 0.0015
 
 _LARGEST = 1e9  # cm

@@ -1,4 +1,4 @@
-"""What the results have in common: coordinates over time, by name."""
+"""Inputs of the plots: coordinates over time, by name."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Motion:
 
     @property
     def profile(self) -> ModelProfile:
-        """What is known of the model whose columns these are."""
+        """The profile of the model with these columns."""
         return self._class.profile
 
     @property
@@ -130,7 +130,7 @@ def is_fit(result: Any) -> bool:
 
 
 def first_film(fit: Any) -> Any:
-    """What a fit of several measurements says of the first, as if it were alone; another fit as it is."""
+    """Return the part of a fit that belongs to its first measurement."""
     if len(fit.measurements) == 1:
         return fit
     n = int((fit.record.film == 0).sum())
@@ -180,7 +180,7 @@ def motions(result: Any) -> list[Motion]:
 
 
 def measured(measurement: Any, model: Any) -> Motion:
-    """What was measured, where it was seen."""
+    """Return the measured coordinates, NaN where a frame has none."""
     seen = measurement.seen
     columns = {name: np.where(seen, measurement[name], np.nan) for name in measurement.names}
     radius = _radius(model) or (float(measurement.meta["R"]) if "R" in measurement.meta else None)

@@ -10,20 +10,20 @@ from udd.errors import UddError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart; lightness differs too, for grey prints.
+# Okabe and Ito's palette, for colour-blind readers; lightness differs too, for grey prints.
 MEASURED = "#4d4d4d"
 BEFORE = "#d55e00"
 AFTER = "#0072b2"
 ALIKE = "#e69f00"
 FLOOR = "#000000"
 FAINT = "#c4c4c4"
-#: What is told apart by colours alone.
+#: Colours of curves that differ in nothing else.
 SHADES = (AFTER, BEFORE, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 MANY = 20_000
 """Dots that are drawn as a picture."""
 
-#: What a coordinate is called on an axis, its unit, and by what its SI value is multiplied.
+#: By coordinate: its name on an axis, its unit, and the factor from SI.
 AXES: dict[str, tuple[str, str, float]] = {
     "t": ("time T", "s", 1.0),
     "Omega": ("angular velocity Ω", "rad/s", 1.0),

@@ -1,4 +1,4 @@
-"""The page's moving picture: what was measured beside what the models make of it, let go at one moment."""
+"""The page's moving picture: the measured motion next to free runs of the models."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ _DRAWINGS = {"disk": _disk, "pendulum": _pendulum}
 
 
 def _padded(seen: Array, frames: int) -> Array:
-    """What ends early stays as it ended."""
+    """Repeat the last row up to so many frames."""
     return seen[np.minimum(np.arange(frames), len(seen) - 1)]
 
 

@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from udd.discovery.results import AddedEffect, Discovery
     from udd.fitting.innovations import Innovations
 
-#: What a model, and one to which something was added, are called over a column of numbers.
+#: Column headings for the known model and for the model with the added effect.
 BEFORE, AFTER = "known model", "with the effect"
 
 
 def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str = "") -> Head:
-    """What stands first: the verdict, what was added, and the held-out errors; `unit` says theirs."""
+    """Build the head: the verdict, the added effect, and the held-out errors with their `unit`."""
     numbers = wording.headline(discovery)
     if believed := belief(discovery.by_record):
         said = [Paragraph(believed), *said]
@@ -54,14 +54,16 @@ def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str
     if discovery.effects:
         interval = f"95 % interval {numbers.interval}"
         shown += [
-            Number("the same with what was added", numbers.after, style="after"),
+            Number("with the added effect", numbers.after, style="after"),
             Number("error after over before", numbers.ratio, interval),
         ]
-    floor = f"noise floor after {numbers.floor_at}: what a faultless model would score"
-    notes = [Paragraph(f"A frame is good to: {wording.noise(discovery)}.")]
+    floor = f"noise floor after {numbers.floor_at}: the error of a faultless model"
+    notes = [Paragraph(f"Noise of one frame: {wording.noise(discovery)}.")]
+    if origin := discovery.measurement.meta.get("origin"):
+        notes.insert(0, Paragraph(str(origin)))
     notes += [Paragraph(remark, "warn") for remark in discovery.remarks]
     if not discovery.fit.converged:
-        settled = "The fit did not converge: no model that was tried settles on these data."
+        settled = "The fit did not converge: no model that was tried fits these data."
         notes.append(Paragraph(f"{settled} Read every number below with care.", "warn"))
     return Head(
         kicker,
@@ -74,11 +76,11 @@ def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str
 
 
 def disk_head(discovery: Discovery) -> Head:
-    """The same of a disk or pendulum."""
+    """Build the head for a disk or a pendulum."""
     thing = discovery.fit.model.profile.shown.noun
     said = [Paragraph(_formula(effect, discovery), "formula") for effect in discovery.effects]
     said += [Paragraph(pretty(sentence)) for sentence in wording.short_limits(discovery)]
-    return head(discovery, f"What the model of the {thing} lacks", said)
+    return head(discovery, f"Effects that the model of the {thing} lacks", said)
 
 
 def _formula(found: AddedEffect, discovery: Discovery) -> Markup:
@@ -93,8 +95,8 @@ def _formula(found: AddedEffect, discovery: Discovery) -> Markup:
 def sections(
     discovery: Discovery, film: str | os.PathLike[str] | None, surprises: Sequence[Innovations]
 ) -> tuple[Section, ...]:
-    """What follows: the motion, the errors, the residuals, the candidates, the limits and the numbers."""
-    # Motions are shown of the first film, where several were fitted together.
+    """Build the sections on motion, errors, residuals, candidates, limits and numbers."""
+    # If several films were fitted together, the first one is shown.
     one = replace(discovery, baseline=first_film(discovery.baseline), fit=first_film(discovery.fit))
     made = [_measured(discovery, one, film), _errors(discovery), _residuals(discovery, surprises)]
     if not discovery.effects:
@@ -107,31 +109,31 @@ def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str]
     disk = profile.contact
     movie = animation.side_by_side(one, film)
     moving = (
-        f"{'The film' if movie.filmed else 'The measured motion'} beside the models, at half its speed. At T "
-        f"= {movie.start:.1f} s, where the data held back from the search begin, each model is let go from "
-        "its own best estimate of the state there; then it sees no more data. "
+        f"{'The film' if movie.filmed else 'The measured motion'} next to the models, at half its speed. The "
+        f"held-out data begin at T = {movie.start:.1f} s. There each model starts from its own best estimate "
+        "of the state and runs without further data. "
     )
-    chaotic = "The motion is chaotic: sooner or later every model parts from it, the right one last."
+    chaotic = "The motion is chaotic: every model leaves it sooner or later, the best one last."
     overlay = (
-        "Frames of the film. Light blue: the fitted disk and its centre. Rings: where its four marks should "
-        "be. Cross: the contact, where the wheels hold the disk."
+        "Frames of the film. Light blue: the fitted disk and its centre. Rings: the expected places of its "
+        "four marks. Cross: the contact between the wheels and the disk."
     )
     path = (
-        "Each dot is where the centre of the disk was seen in one frame, the line is the fitted path; the "
-        "cross is the contact, and beyond the dashed circle the disk leaves the wheels."
+        "Dots: the measured centre of the disk in each frame. Line: the fitted path. Cross: the contact. "
+        "Beyond the dashed circle the disk leaves the wheels."
         if disk
         else "Angular velocity against angle."
     )
     alike = "; the motion is chaotic, so the runs resemble the record in their shape, not point by point."
-    free = " A free run starts where the record starts and then sees no more data" + (alike if disk else ".")
+    free = " A free run starts at the start of the record and uses no further data" + (alike if disk else ".")
     moment = (
-        "A closer look at one moment: at the line each model is let go"
+        "A closer look at one moment: each model starts at the line"
         if not profile.forecast_end
-        else f"The end of the record: each model was let go at T = {discovery.split:.1f} s"
+        else f"The end of the record: each model starts at T = {discovery.split:.1f} s"
     )
     closer = (
         f"{moment}, from its own best estimate of the state there, with the parameters fitted to all data. "
-        "This is one example; the errors over many starts, on data held back from the fit, are below."
+        "This is one example; the errors over many starts, on held-out data, are below."
     )
     shown = parts(
         Paragraph(tables.measured(discovery)),
@@ -140,7 +142,7 @@ def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str]
         Figure(figures.orbits(one), path + free),
         Figure(figures.forecast(one), closer),
     )
-    return Section("What was measured", shown)
+    return Section("The measured motion", shown)
 
 
 def errors_heading(discovery: Discovery) -> str:
@@ -153,21 +155,21 @@ def errors_heading(discovery: Discovery) -> str:
 def errors_table(discovery: Discovery) -> Table:
     """Held-out errors at every horizon."""
     columns = {
-        "horizon": Column("let go for", number=True, names=True),
+        "horizon": Column("forecast horizon", number=True, names=True),
         "before": Column(BEFORE, number=True),
-        "after": Column("with what was added", number=True),
+        "after": Column(AFTER, number=True),
         "floor": Column("noise floor", number=True),
     }
     return table(errors_heading(discovery), columns_with(columns, discovery), tables.errors(discovery))
 
 
 def columns_with(columns: dict[str, Column], discovery: Discovery) -> dict[str, Column]:
-    """The columns without what there is only after something was added."""
+    """Return the columns, without the one for an added effect if there is none."""
     return {name: c for name, c in columns.items() if name != "after" or discovery.effects}
 
 
 def held_back(discovery: Discovery) -> str:
-    """Which data were held out."""
+    """Name the held-out data."""
     m = discovery.measurement
     if discovery.held_out:
         return f"Whole records, by number {', '.join(map(str, discovery.held_out))},"
@@ -175,15 +177,15 @@ def held_back(discovery: Discovery) -> str:
 
 
 def _errors(discovery: Discovery) -> Section:
-    proved = "; there the effect had to prove itself" if discovery.effects else ""
+    proved = "; the effect had to pass this test" if discovery.effects else ""
     said = (
-        f"{held_back(discovery)} were held back. On them the model was let go at "
-        f"{len(discovery.error_before.samples)} moments, each time from a state that the data just before it "
-        f"show{proved}."
+        f"{held_back(discovery)} were not used for the fit. On them the model was run from "
+        f"{len(discovery.error_before.samples)} moments, each time from the state that the preceding data "
+        f"give{proved}."
     )
     caption = (
-        "Median error, with 95 % intervals. Dotted: the noise floor, which noise in the data and in the "
-        "starting state alone would leave to a faultless model."
+        "Median error, with 95 % intervals. Dotted: the noise floor, the error of a faultless model due to "
+        "noise in the data and in the starting state."
     )
     shown = parts(Paragraph(said), Figure(figures.errors(discovery), caption), errors_table(discovery))
     return Section(errors_heading(discovery), shown)
@@ -194,21 +196,21 @@ def _residuals(discovery: Discovery, surprises: Sequence[Innovations]) -> Sectio
     if discovery.effects:
         loose.append(loosest(discovery.fit))
     more = (
-        "A frame marks where the known model leaves more than that: a pattern may spill over into equations "
-        "that are right, but with the effect all should be gone."
+        "A frame marks larger residuals of the known model. A pattern may also show in equations that are "
+        "right, but with the effect all patterns should be gone."
         if discovery.effects
-        else "A frame marks where it is more than that."
+        else "A frame marks larger residuals."
     )
     said = (
-        "If a model is right, what each of its equations leaves over is noise about zero, whatever it is "
-        f"drawn against. {more}"
+        "If a model is right, the residual of each equation is noise about zero along every coordinate. "
+        f"{more}"
     )
     colours = "; orange the known model, blue with the added effect" if discovery.effects else ""
     caption = (
-        "Rows: the equations. Columns: what their residual is drawn against. Lines: means, with bands of two "
-        f"standard errors{colours}. Each row has one scale, given on its left: how far the motion departs "
-        "from the equation, in a fit that follows the data closely and leans little on the model. The errors "
-        "count how long neighbouring frames go together."
+        "Rows: the equations. Columns: the coordinates. Lines: mean residuals, with bands of two "
+        f"standard errors{colours}. Each row has one scale, given on its left. The residual is the departure "
+        "of the motion from the equation, in a fit that follows the data closely and weights the model "
+        "little. The standard errors take the correlation of neighbouring frames into account."
     )
     clearest = "The clearest pattern, frame by frame (grey), with its means and two standard errors."
     shown = parts(
@@ -221,8 +223,8 @@ def _residuals(discovery: Discovery, surprises: Sequence[Innovations]) -> Sectio
 
 
 def whiteness(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[Part, ...]:
-    """Whether the innovations are white noise."""
-    title = "Are the surprises white noise?"
+    """Build the test of the innovations for white noise."""
+    title = "Are the innovations white noise?"
     columns = {
         "name": Column("channel", names=True),
         "model": Column("model"),
@@ -235,9 +237,9 @@ def whiteness(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[P
         f"Autocorrelation of the innovations{both}. The grey band holds 95 % of the values of white noise."
     )
     said = (
-        "A model that is right foretells each frame from those before it, up to white noise. What it did not "
-        "foretell, the innovation, should have a mean square of 1 in units of what was expected, and no "
-        "memory."
+        "A right model predicts each frame from the earlier ones, up to white noise. The innovation is the "
+        "frame minus its prediction. In units of its expected standard deviation its mean square should be "
+        "1, and its autocorrelation 0."
     )
     return (
         Subheading(title),
@@ -248,25 +250,24 @@ def whiteness(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[P
 
 
 def tried_heading(discovery: Discovery) -> str:
-    """Over the candidates."""
-    return "What was added, and why" if discovery.effects else "What was tried"
+    """Return the heading over the candidates."""
+    return "The added effect, and why" if discovery.effects else "The candidates"
 
 
 def nearest(discovery: Discovery) -> tuple[Part, ...]:
-    """What nearly passed."""
+    """List the candidates that nearly passed."""
     sentences = wording.rejected(discovery)
-    return (Paragraph("Nearest come:"), Bullets(tuple(map(pretty, sentences)))) if sentences else ()
+    return (Paragraph("The nearest candidates:"), Bullets(tuple(map(pretty, sentences)))) if sentences else ()
 
 
 def reasons(discovery: Discovery) -> tuple[Part, ...]:
-    """Why each effect was added."""
+    """Give the reasons for each added effect."""
     made = []
     for effect in discovery.effects:
         chance = Markup("{}").format(wording.probability(effect.p))
         text = Markup(
-            "<strong>{}</strong>: χ² fell by {:.0f} when it was added; the probability of that by chance, "
-            "all "
-        ).format(pretty(effect.title), effect.chi2) + Markup("candidates counted, is {}. {}").format(
+            "<strong>{}</strong>: it decreased χ² by {:.0f}; the probability of that by chance, over all "
+        ).format(pretty(effect.title), effect.chi2) + Markup("candidates, is {}. {}").format(
             chance, wording.confirmed_by(effect)
         )
         made.append(Paragraph(text))
@@ -278,16 +279,16 @@ def _tried(discovery: Discovery) -> Section:
         ", and so were smooth curves and surfaces in every equation" if tables.curves(discovery, 0) else ""
     )
     rule = (
-        "One was added only if chance would hardly do as well (less than 0.1 % over all candidates "
-        "together), if its numbers are physical, and if the data held back bear it out."
+        "A candidate was added only if chance would rarely do as well (less than 0.1 % over all candidates "
+        "together), if its parameters are physical, and if the held-out data confirm it."
         if discovery.effects
-        else "None passed: to be added, chance must hardly do as well (less than 0.1 % over all candidates "
-        "together), the numbers must be physical, and the data held back must bear it out."
+        else "None passed: chance must rarely do as well (less than 0.1 % over all candidates together), "
+        "the parameters must be physical, and the held-out data must confirm the candidate."
     )
     caption = (
-        "What is missing, as a curve that the data alone draw, without a formula; the band holds it with 95 "
-        "%. What the known model's own numbers could do just as well is taken out. Ticks or dots: where the "
-        "record has been."
+        "The missing term as a curve, estimated from the data without a formula, with its 95 % band. "
+        "The part that the known model's parameters could absorb is removed. Ticks or dots: places that the "
+        "record visits."
     )
     drawn = [Figure(figures.curve(f.curve), caption) for f in discovery.effects if f.curve is not None]
     rounds = [part for stage in range(len(discovery.scans)) for part in _round(discovery, stage)]
@@ -297,7 +298,7 @@ def _tried(discovery: Discovery) -> Section:
 
 
 def round_heading(stage: int) -> str:
-    """Over one round of the search."""
+    """Return the heading over one round of the search."""
     return "After adding what was found" if stage else "First search"
 
 
@@ -327,16 +328,16 @@ def _round(discovery: Discovery, stage: int) -> tuple[Part, ...]:
         table(f"{round_heading(stage)}: the best curves", columns, curves), summary="Table of the best curves"
     )
     caption = (
-        "The longer the bar, the more the fit improves; the scale is logarithmic. The bar of the effect that "
-        "was added shows by how much χ² decreased; the other bars, and the estimates in the table, are first "
-        "ones, made around the model as it was."
+        "The longer the bar, the more the fit improves; the scale is logarithmic. The bars of the added "
+        "effect, and of effects that act identically, show the decrease in χ² of the full fit. The other "
+        "bars, and the estimates in the table, are first estimates from the fit before."
     )
     bars = Figure(figures.evidence(discovery, stage), caption)
     return parts(Subheading(round_heading(stage)), bars, best, smooth if curves else None)
 
 
 def others(discovery: Discovery) -> Section:
-    """What the data cannot tell apart from what was found."""
+    """List the effects that these data cannot distinguish from the added one."""
     listed: list[Text] = []
     for other in discovery.alternatives:
         title = f"{other.title[0].upper()}{other.title[1:]}"
@@ -351,14 +352,14 @@ def others(discovery: Discovery) -> Section:
 
 
 def others_of(discovery: Discovery, listed: tuple[Text, ...]) -> Section:
-    """What else it could be, and what to film to tell."""
+    """Build the section of alternatives, with the film that would decide."""
     hint = discovery.hint
-    tell = Paragraph(Markup("To tell: {}.").format(pretty(hint.text))) if hint is not None else None
-    return Section("What else it could be", parts(Bullets(listed), tell))
+    tell = Paragraph(Markup("To decide: {}.").format(pretty(hint.text))) if hint is not None else None
+    return Section("Alternatives", parts(Bullets(listed), tell))
 
 
 def _limits(discovery: Discovery) -> Section:
-    return Section("What these data cannot say", (Bullets(tuple(wording.limits(discovery))),))
+    return Section("Limits of these data", (Bullets(tuple(wording.limits(discovery))),))
 
 
 def _numbers(discovery: Discovery, one: Discovery) -> Section:
@@ -375,12 +376,12 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
         for row in tables.fixed(discovery)
     ]
     bends = (
-        " A model that lacks something bends them, as it bends the other numbers: compare the two columns."
+        " A missing effect distorts them, as it distorts the other parameters: compare the two columns."
         if discovery.effects
         else ""
     )
     camera = (
-        "These were fitted along with the rest, so that a crooked or shifted camera does not pass for an "
+        "These were fitted with the rest, so that a tilted or shifted camera is not mistaken for an "
         f"effect.{bends}"
     )
     noise = {
@@ -390,7 +391,7 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
         "stated": Column(tables.noise_beforehand(discovery.fit), number=True),
     }
     fitted = "the added effect" if discovery.effects else "the known model"
-    braking = "The friction coefficient k(Ω) that was found, with everything that brakes the rotation in it."
+    braking = "The fitted friction coefficient k(Ω), including all effects that brake the rotation."
     shown = parts(
         Figure(figures.friction(discovery.fit), braking),
         table(
@@ -399,13 +400,13 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
             [*tables.parameters(discovery), *fixed],
             "Parameters of the model, with standard errors",
         ),
-        Subheading("What the camera got wrong"),
+        Subheading("Faults of the camera"),
         Paragraph(camera),
-        table("What the camera got wrong", columns, tables.camera(discovery)),
+        table("Faults of the camera", columns, tables.camera(discovery)),
         Subheading("The noise"),
         Figure(
             figures.misfits(one.fit),
-            f"Measured less fitted, with {fitted}. The band holds 95 % of honest noise.",
+            f"Measured less fitted, with {fitted}. The band holds 95 % of the noise.",
         ),
         table("The noise", noise, tables.noise(discovery.fit)),
     )

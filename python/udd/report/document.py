@@ -21,12 +21,12 @@ _RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 
 
 def plain(text: Text) -> str:
-    """Without the HTML; exponents are raised all the same."""
+    """Return a text without its HTML; exponents stay raised."""
     return text_of(text) if isinstance(text, Markup) else text
 
 
 def text_of(markup: object) -> str:
-    """What is written with tags, as text alone."""
+    """Return markup as plain text, with raised exponents."""
     raised = re.sub(r"<sup>(.*?)</sup>", lambda m: m[1].translate(_RAISED), str(markup))
     return html.unescape(re.sub(r"<[^>]*>", "", raised))
 
@@ -41,7 +41,7 @@ class Image(OneLine):
 
     @property
     def ending(self) -> str:
-        """What the name of its file ends in."""
+        """The ending of its file name."""
         kind = self.uri.removeprefix("data:").partition(";")[0]
         return {"image/svg+xml": "svg"}.get(kind, kind.partition("/")[2])
 
@@ -62,7 +62,7 @@ class Movie(Image):
     titles : tuple of str
         Of its panels, from the left.
     start, seconds : float
-        Time at which the models are let go, and for how long they are shown, s.
+        Time at which the free runs start, and for how long they are shown, s.
     filmed : bool
         Whether the first panel is the film itself.
     """
@@ -131,12 +131,12 @@ class Table(OneLine):
     Attributes
     ----------
     title : str
-        What it is called where it stands alone.
+        Its name when it stands alone.
     columns : tuple of Column
     rows : tuple of tuple of str
     caption : str
     summary : str
-        Where it can be folded away, what is shown of it then.
+        The line that is shown while it is folded; "" if it cannot be folded.
     open : bool
         Whether it begins unfolded.
     marked : frozenset of int
@@ -170,7 +170,7 @@ class Section(OneLine):
 
 @dataclass(frozen=True, repr=False)
 class Number(OneLine):
-    """One of the numbers at the top: what it is, its value, a remark, and a class of the style sheet."""
+    """A number at the top: its name, its value, a remark, and a class of the style sheet."""
 
     what: Text
     value: Text
@@ -180,7 +180,7 @@ class Number(OneLine):
 
 @dataclass(frozen=True, repr=False)
 class Head(OneLine):
-    """What stands first.
+    """The head of a report.
 
     Attributes
     ----------

@@ -86,13 +86,11 @@ def forecast(discovery: Discovery) -> Image:
     ax.set_ylabel(label(name))
     ax.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     tidy(ax)
-    return svg(
-        figure, f"{name} over time: measured, and free runs of the models from the moment they are let go"
-    )
+    return svg(figure, f"{name} over time: measured, and free runs of the models from their start")
 
 
 def residual_map(loose: Sequence[Fit]) -> Image:
-    """What each equation leaves over along each coordinate, before and after."""
+    """Draw the mean residual of each equation along each coordinate, before and after."""
     rows = len(loose[0].model.state_names)
     figure, ((ax,),) = blank(9.4, 0.95 * rows + 0.55, left=1.05, bottom=0.5, top=0.05)
     plot.residual_map(loose[-1], ax, before=loose[0] if len(loose) > 1 else None)
@@ -141,7 +139,7 @@ def errors(discovery: Discovery) -> Image:
     """Held-out errors against the horizon."""
     figure, ((ax,),) = blank(6.4, 3.8, top=0.4)
     plot.errors(discovery, ax)
-    return svg(figure, "Median error on held-out data against the time since the model was let go")
+    return svg(figure, "Median error on held-out data against the forecast horizon")
 
 
 def whiteness(found: Sequence[Innovations]) -> Image:
@@ -172,7 +170,7 @@ def friction(fit: Fit) -> Image:
 
 
 def misfits(fit: Fit) -> Image:
-    """What was seen less what was fitted, per channel."""
+    """Draw measured minus fitted values, per channel."""
     names = fit.measurement.names
     figure, grid = blank(9.0, 1.55 * len(names) + 0.7, rows=len(names))
     for (ax,), name in zip(grid, names, strict=True):

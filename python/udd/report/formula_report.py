@@ -53,32 +53,32 @@ _SHOWN = 8.0  # longest horizons of the held-out errors that the free runs are s
 
 
 def formula_head(discovery: Discovery) -> Head:
-    """What stands first."""
+    """Build the head."""
     said = []
     for found in discovery.effects:
         values = Markup("")
         if not wording.is_spline(found.effect):
             values = Markup(" &ensp;with ") + wording.values_of(found, {})
         said.append(Paragraph(Markup("{}").format(found.equation) + values, "formula"))
-    return head(discovery, "What the model lacks", said, ", in units of the motion's spread")
+    return head(discovery, "Effects that the model lacks", said, ", in units of the motion's spread")
 
 
 def sections(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[Section, ...]:
-    """What follows: the motion, the model, the errors, the candidates, the innovations and the numbers."""
+    """Build the sections on motion, model, errors, candidates, innovations and numbers."""
     made = [_measured(discovery), _known(discovery), _errors(discovery), _tried(discovery)]
     if discovery.effects:
         made.append(others(discovery))
-    made.append(Section("The surprises", whiteness(discovery, surprises)))
+    made.append(Section("The innovations", whiteness(discovery, surprises)))
     return (*made, _numbers(discovery))
 
 
 def _measured(discovery: Discovery) -> Section:
     caption = (
-        "Where the data held back from the search begin, each model is let go from its own best estimate of "
-        "the state; then it sees no more data."
+        "At the start of the held-out data each model starts from its own best estimate of the state and "
+        "runs without further data."
     )
     shown = (Paragraph(measured(discovery)), Figure(_free_runs(discovery), caption))
-    return Section("What was measured", shown)
+    return Section("The measured motion", shown)
 
 
 def _known(discovery: Discovery) -> Section:
@@ -89,30 +89,26 @@ def _known(discovery: Discovery) -> Section:
 def _errors(discovery: Discovery) -> Section:
     caption = (
         f"Median error over {len(discovery.error_before.samples)} starts, with 95 % intervals. Dotted: the "
-        "noise floor, which noise in the data and in the starting state alone would leave to a faultless "
-        "model."
+        "noise floor, the error of a faultless model due to noise in the data and in the starting state."
     )
-    held = Paragraph(f"{held_back(discovery)} were held back.") if discovery.held_out else None
+    held = Paragraph(f"{held_back(discovery)} were not used for the fit.") if discovery.held_out else None
     shown = parts(held, Figure(figures.errors(discovery), caption), errors_table(discovery))
     return Section(errors_heading(discovery), shown)
 
 
 def _tried(discovery: Discovery) -> Section:
     rule = (
-        "One was added only if chance would hardly do as well (less than 0.1 % over all of them together), "
-        "and if the data held back bear it out."
+        "A candidate was added only if chance would rarely do as well (less than 0.1 % over all of them "
+        "together), and if the held-out data confirm it."
         if discovery.effects
-        else "None passed: chance must hardly do as well (less than 0.1 % over all of them together), and "
-        "the data held back must bear it out."
+        else "None passed: chance must rarely do as well (less than 0.1 % over all of them together), and "
+        "the held-out data must confirm the candidate."
     )
     said = (
         "Terms made of the states were tried in every equation, and so were waves of every frequency, smooth "
         f"curves and surfaces. {rule}"
     )
-    caption = (
-        "What is missing, as a curve that the data alone draw, without a formula; the band holds it with "
-        "95 %."
-    )
+    caption = "The missing term as a curve, estimated from the data without a formula, with its 95 % band."
     drawn = [
         Figure(figures.curve(f.curve), caption)
         for f in discovery.effects
@@ -127,7 +123,7 @@ def _tried(discovery: Discovery) -> Section:
 
 
 def others(discovery: Discovery) -> Section:
-    """What the data cannot tell apart from what was found."""
+    """List the terms that these data cannot distinguish from the added one."""
     listed: list[Text] = [
         Markup(
             "<strong>{}</strong> ({}) instead of {}: worse by {:.1f} units of log-likelihood; a form is "
@@ -145,18 +141,18 @@ def _numbers(discovery: Discovery) -> Section:
     columns = {
         "name": Column("symbol", names=True),
         "before": Column(BEFORE, number=True),
-        "after": Column("with what was added", number=True),
+        "after": Column("with the added effect", number=True),
     }
     caption = "Parameters, with standard errors"
     shown = (
         table("The numbers", columns_with(columns, discovery), parameters(discovery), caption),
-        Figure(_misfits(discovery.fit), "Measured less fitted. The band holds 95 % of honest noise."),
+        Figure(_misfits(discovery.fit), "Measured less fitted. The band holds 95 % of the noise."),
     )
     return Section("The numbers", shown)
 
 
 def parameters(discovery: Discovery) -> list[dict[str, Text]]:
-    """Every free parameter, before and after."""
+    """List every free parameter, before and after."""
     rows: list[dict[str, Text]] = []
     for name in discovery.fit.parameters:
         before, after = (
@@ -168,7 +164,7 @@ def parameters(discovery: Discovery) -> list[dict[str, Text]]:
 
 
 def equations(discovery: Discovery) -> list[str]:
-    """The known model."""
+    """List the equations of the known model."""
     model = discovery.baseline.model
     assert isinstance(model, FormulaModel)
     late = dict(model.delays)
@@ -180,7 +176,7 @@ def equations(discovery: Discovery) -> list[str]:
 
 
 def measured(discovery: Discovery) -> str:
-    """What was measured, in a sentence."""
+    """Describe the measured data in a sentence."""
     m, fit = discovery.measurement, discovery.fit
     sd = np.median(fit.noise.sd(fit.record, fit.states[:, 0]), axis=0)
     seen = [(name, s) for name, s in zip(fit.channels, sd, strict=True) if np.isfinite(s)]
@@ -190,15 +186,15 @@ def measured(discovery: Discovery) -> str:
     if fit.model.observe:
         hidden = [f"{name} = {text}" for name, text in fit.model.observe if name not in m.names]
     what = f"{', '.join(m.names)} in {len(m)} frames over {m.duration:.4g} s"
-    rest = f" Not seen: {', '.join(hidden)}." if hidden else ""
-    return f"{what}; noise as the record shows it: {noise}.{rest}"
+    rest = f" Not measured: {', '.join(hidden)}." if hidden else ""
+    return f"{what}; noise estimated from the record: {noise}.{rest}"
 
 
 def _free_runs(discovery: Discovery) -> Image:
     names = [name for name in discovery.fit.channels if name in discovery.measurement.names]
     t, seen, found = side_by_side(discovery, _SHOWN * discovery.error_before.horizons[-1])
     figure, grid = blank(9.0, 1.7 * len(names) + 0.9, rows=len(names), top=0.4)
-    said = (("the known model", KNOWN), ("with what was added", ADDED))
+    said = (("the known model", KNOWN), ("with the added effect", ADDED))
     for (ax,), name in zip(grid, names, strict=True):
         k = discovery.fit.channels.index(name)
         ax.plot(t, seen[:, k], ".", color=MEASURED, markersize=3, label="measured")

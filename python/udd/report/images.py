@@ -42,17 +42,17 @@ def blank(
 
 
 def svg(figure: Figure, alt: str) -> Image:
-    """For lines."""
+    """Save a figure of lines."""
     return embedded(figure, "svg", alt, dpi=150)
 
 
 def png(figure: Figure, alt: str) -> Image:
-    """For thousands of dots."""
+    """Save a figure of thousands of dots."""
     return embedded(figure, "png", alt, dpi=170)
 
 
 def embedded(figure: Figure, kind: str, alt: str, dpi: int) -> Image:
-    """Of any kind that matplotlib can write."""
+    """Save a figure in any format of matplotlib, as a data URI."""
     import matplotlib as mpl
 
     buffer = io.BytesIO()

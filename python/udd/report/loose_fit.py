@@ -1,4 +1,4 @@
-"""A fit that leans little on its model, which shows what the model's equations leave over."""
+"""A fit that weights its model little and so shows the residuals of its equations."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from udd.fitting.solve import solve
 
 
 def loosest(fit: Fit) -> Fit:
-    """Solve again with the largest assumed error of the model at which the states are smoother than the data.
+    """Solve again with the largest assumed model error at which the states are smoother than the data.
 
-    A tight fit of a wrong model bends the states to obey it, and its residuals with them.
+    A tight fit of a wrong model distorts the states and with them its residuals.
     """
     result = fit
     for diffusion in levels(fit.measurement.kind):

@@ -19,7 +19,7 @@ from udd.errors import UddError
 from udd.fitting.innovations import innovations
 
 from . import discovery_report, formula_report, wording
-from .document import Head, Report, Section
+from .document import Head, Report, Section, plain
 
 if TYPE_CHECKING:
     from udd.discovery.results import Discovery
@@ -30,20 +30,20 @@ GUIDE = (
     ("Known model", "The equations that were given, fitted to the same data, before anything was added."),
     (
         "Held-out error",
-        "How far off a model is on data that no fit has seen, after it was let go for a time.",
+        "The error of a model that runs freely for a time, on data that no fit used.",
     ),
-    ("Noise floor", "The error that a faultless model would have: noise of the data and of its start alone."),
+    ("Noise floor", "The error of a faultless model, due to noise in the data and in its starting state."),
     ("95 % interval", "The true value lies in it in 19 of 20 such cases; ± is one standard error."),
     (
         "Decrease in χ²",
-        "By how much the misfit, in units of the noise, decreases with an effect. Chance reaches the dashed "
-        "line once in a thousand searches.",
+        "The misfit in units of the noise, without the effect minus with it. Chance reaches the dashed line "
+        "once in a thousand searches.",
     ),
     (
         "Consistent, constraint",
         "How an effect enters: with the torque that goes with it, or as a change of the rolling alone.",
     ),
-    ("Residual", "What an equation leaves over: noise about zero if the model is right."),
+    ("Residual", "The departure of the motion from an equation: noise about zero if the model is right."),
 )
 
 
@@ -54,18 +54,17 @@ def report_of(
     source: str | os.PathLike[str] | None = None,
     command: str | None = None,
 ) -> Report:
-    """A discovery as a report: sections of text, figures and tables.
+    """Build the report of a discovery: sections of text, figures and tables.
 
     Parameters
     ----------
     discovery : Discovery
     film : path, optional
-        The film that the measurement was tracked in; a stretch of it is shown beside the models.
+        The film in which the measurement was tracked; a stretch of it is shown next to the models.
     source : path, optional
         The file that the analysis began with, named with its SHA-256; by default the film.
     command : str, optional
-        How the report was made, for those who want to make it again; by default what `udd discover` takes for
-        the same analysis with its usual options.
+        The command that makes the report again; by default that of `udd discover` with its usual options.
 
     Raises
     ------
@@ -78,8 +77,8 @@ def report_of(
         raise UddError("a film shows a disk, not a model of your own")
     fits = [discovery.baseline, *([discovery.fit] if discovery.effects else [])]
     surprises = [innovations(fit) for fit in fits]
-    with ThreadPoolExecutor(1) as beside:  # what to film next is for the core, pictures are Python's
-        beside.submit(lambda: discovery.hints)
+    with ThreadPoolExecutor(1) as background:  # the core computes hints while Python draws
+        background.submit(lambda: discovery.hints)
         if of_own:
             sections = formula_report.sections(discovery, surprises)
         else:
@@ -89,7 +88,7 @@ def report_of(
 
 
 def summary_of(discovery: Discovery) -> Report:
-    """The verdict, why each effect was added, what came near and what else it could be; no pictures."""
+    """Build a report without pictures: the verdict, the reasons, near misses and alternatives."""
     tried = (*discovery_report.nearest(discovery), *discovery_report.reasons(discovery))
     of_own = discovery.fit.model.profile.written
     others = formula_report.others(discovery) if of_own else discovery_report.others(discovery)
@@ -111,7 +110,7 @@ def write(
     source: str | os.PathLike[str] | None = None,
     command: str | None = None,
 ) -> Report:
-    """Write a discovery as one HTML page that stands alone: pictures first, no script, no links.
+    """Write a discovery as one self-contained HTML page, without scripts or external links.
 
     Parameters
     ----------
@@ -124,7 +123,7 @@ def write(
     Returns
     -------
     Report
-        What the page shows.
+        The content of the page.
 
     Raises
     ------
@@ -160,18 +159,18 @@ def write_page(report: Report, path: str | os.PathLike[str]) -> None:
 
 
 def _data(report: Report) -> list[tuple[str, str]]:
-    """The tables of a report as files within it: their names and data URIs."""
+    """Return the tables of a report as titles and data URIs."""
     made = []
-    for number, part in enumerate(report.tables, start=1):
+    for part in report.tables:
         text = io.StringIO()
         csv.writer(text).writerows(part.plain())
         encoded = base64.b64encode(text.getvalue().encode()).decode()
-        made.append((f"table-{number}.csv", f"data:text/csv;charset=utf-8;base64,{encoded}"))
+        made.append((plain(part.title), f"data:text/csv;charset=utf-8;base64,{encoded}"))
     return made
 
 
 def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
-    """A file's name and SHA-256."""
+    """Return a file's name and SHA-256."""
     if path is None:
         return None
     try:

@@ -31,7 +31,7 @@ class Forecast:
     Attributes
     ----------
     start : float
-        When the models are let go, s.
+        Time at which the free runs start, s.
     t_seen, seen : ndarray (n,), (n, m)
     t : ndarray (k,)
     before, after : ndarray (k, m)

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 def parameters(discovery: Discovery) -> list[dict[str, str]]:
-    """The model's free parameters: name, meaning, before, after, unit."""
+    """List the model's free parameters: name, meaning, before, after, unit."""
     hidden, own = _knots(discovery), discovery.fit.model.parameters
     return _rows(discovery, lambda name: _base(name) in own and _base(name) not in hidden)
 
 
 def camera(discovery: Discovery) -> list[dict[str, str]]:
-    """What the camera got wrong, likewise."""
+    """List the fitted parameters of the camera: name, meaning, before, after, unit."""
     own = discovery.fit.model.parameters
     return _rows(discovery, lambda name: _base(name) not in own, share=("%", 100.0))
 
@@ -106,7 +106,7 @@ def _meaning(name: str, discovery: Discovery) -> str:
 
 
 def measured(discovery: Discovery) -> Markup:
-    """What was measured, in a few sentences."""
+    """Describe the measured data in a few sentences."""
     m, model = discovery.measurement, discovery.baseline.model
     several = len(discovery.fit.measurements)
     usable = int(m.seen.sum())
@@ -119,7 +119,7 @@ def measured(discovery: Discovery) -> Markup:
 
 
 def whiteness(innovations: Sequence[Innovations]) -> list[dict[str, str]]:
-    """What remains in the innovations, channel by channel, before and after."""
+    """List the tests of the innovations, channel by channel, before and after."""
     rows = []
     for k, name in enumerate(innovations[0].names):
         for found, model in zip(innovations, ("known model", "with the effect"), strict=False):
@@ -138,13 +138,13 @@ def whiteness(innovations: Sequence[Innovations]) -> list[dict[str, str]]:
 
 
 def noise_beforehand(fit: Fit) -> str:
-    """What the noise that a fit begins with is called: a record without standard errors states none."""
+    """Name the noise at the start of a fit: stated, or assumed if the record has no standard errors."""
     stated = any(m.sigma is not None for m in fit.measurements)
     return "the measurement said" if stated else "assumed beforehand"
 
 
 def noise(fit: Fit) -> list[dict[str, str]]:
-    """The noise that was found: channel, at rest, growth with the speed, what it began with."""
+    """List the fitted noise: channel, at rest, growth with the speed, value at the start."""
     rows = []
     for k, name in enumerate(fit.measurement.names):
         sigma = fit.record.sigma[:, k]
@@ -162,7 +162,7 @@ def noise(fit: Fit) -> list[dict[str, str]]:
 
 
 def errors(discovery: Discovery) -> list[dict[str, str]]:
-    """Held-out errors at every horizon."""
+    """List the held-out errors at every horizon."""
     before, after = discovery.error_before, discovery.error_after
     rows = []
     for h in before.horizons:
@@ -187,7 +187,7 @@ def _interval(e: tuple[float, float, float, float], unit: str) -> str:
 
 
 def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, str]]:
-    """The best of the curves that were tried."""
+    """List the best curves."""
     scans = discovery.curves
     return [
         {"title": c.title, "evidence": odds(c.evidence), "p": wording.probability(c.p)}
@@ -196,7 +196,7 @@ def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, st
 
 
 def candidates(discovery: Discovery, stage: int, most: int = 12) -> list[dict[str, str]]:
-    """What the score said of the best candidates."""
+    """List the scores of the best candidates."""
     rows = []
     found = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
@@ -216,7 +216,7 @@ def candidates(discovery: Discovery, stage: int, most: int = 12) -> list[dict[st
                 ),
                 "said": "found"
                 if title in found
-                else "cannot be told apart"
+                else "cannot be distinguished"
                 if title in alike
                 else "not visible in this record"
                 if s.absorbed

@@ -89,7 +89,7 @@ def _head(m: Measurement, checked: Health | None) -> Head:
     if m.meta.get("turned"):
         said.append("The film was turned upright, as gravity and the drive show.")
     notes = tuple(Paragraph(text, "warn") for text in said)
-    return Head("What the film shows", headline(m), numbers=numbers(m, checked), notes=notes)
+    return Head("Tracking", headline(m), numbers=numbers(m, checked), notes=notes)
 
 
 def _found(video: str | os.PathLike[str], m: Measurement) -> Section:
@@ -100,16 +100,16 @@ def _found(video: str | os.PathLike[str], m: Measurement) -> Section:
     )
     shown = (
         Gallery(frames(video, m)),
-        Paragraph(f"Drawn upon frames of the film: {drawn}; nothing is drawn where nothing is known."),
+        Paragraph(f"Drawn on frames of the film: {drawn}. Frames without a position have no drawing."),
         Figure(motion(m), "The motion. Strips in red: frames that hold no position."),
     )
-    return Section("What was found", shown)
+    return Section("Positions", shown)
 
 
 def _calibrated(m: Measurement) -> Section:
     said = (
-        "What the film itself says of them, with standard errors. Scale and contact are common to all "
-        "positions; what was said by hand is “given”."
+        "Estimates from the film, with standard errors. Scale and contact are common to all positions; "
+        "values given by the user are marked “given”."
     )
     columns = {
         "name": Column("item", names=True),
@@ -124,8 +124,8 @@ def _calibrated(m: Measurement) -> Section:
 
 def _each_frame(m: Measurement, detail: Tracking | None) -> Section:
     off = (
-        "Residual: r.m.s. distance of the marks from where the rigid body has them. In view: share of the "
-        "marks' edges that is seen. "
+        "Residual: r.m.s. distance of the marks from their places on the rigid body. In view: visible share "
+        "of the marks' edges. "
         if profile_of(m.kind).sensor.sees_marks
         else "Residual: distance of the bob from its circle. In view: its area against the usual one. "
     )
@@ -150,35 +150,33 @@ def _each_frame(m: Measurement, detail: Tracking | None) -> Section:
 def _rolls(checked: Health | None) -> Section:
     if checked is None:
         said = (
-            "This motion does not determine contact and drive (it is short, or a steady rotation), so "
-            "nothing can be said."
+            "This motion (short, or a steady rotation) does not determine the contact and the drive, so "
+            "rolling cannot be tested."
         )
         return Section("Does it roll?", (Paragraph(said),))
     left, noise = (wording.length(x, "m") for x in (checked.rms, checked.noise))
     said = (
-        "Where the wheels hold the disk it turns about one point while it is driven past it: dY/dT = Z Ω, "
-        f"dZ/dT = −Y Ω + W. Over stretches of 1.5 s that leaves {left} r.m.s.; the frames' own errors would "
-        f"leave {noise}. Much more than that is slip, a wrong clock, a camera that is not what it was taken "
-        "for, or a law that is not quite this one."
+        "At the contact the disk turns about one point while the wheels drive it past that point: "
+        f"dY/dT = Z Ω, dZ/dT = −Y Ω + W. Over stretches of 1.5 s the violation is {left} r.m.s.; the noise "
+        f"of the frames alone would give {noise}. A much larger value points to slip, a wrong clock, a wrong "
+        "camera model, or a slightly different law."
     )
-    caption = (
-        "What is left of the rolling constraint, with a band of two standard errors of the frames' noise."
-    )
+    caption = "Violation of the rolling constraint, with a band of two standard errors of the frames' noise."
     return Section("Does it roll?", (Paragraph(said), Figure(rolling(checked), caption)))
 
 
 def headline(m: Measurement) -> str:
-    """The whole result in one sentence."""
+    """Sum up the result in one sentence."""
     usable = int(m.seen.sum())
     share = "Every frame" if usable == len(m) else f"{usable} of {len(m)} frames"
     what = f"the {profile_of(m.kind).shown.noun}"
     gone = int(sum(str(f).startswith("gone") for f in m.flag))
-    rest = f"; it leaves the wheels, and nothing is said of the last {gone} frames" if gone else ""
-    return f"{share} of this film {'says' if usable == len(m) else 'say'} where {what} is{rest}"
+    rest = f"; it leaves the wheels, and the last {gone} frames have no position" if gone else ""
+    return f"{share} of this film {'gives' if usable == len(m) else 'give'} the position of {what}{rest}"
 
 
 def numbers(m: Measurement, checked: Health | None) -> tuple[Number, ...]:
-    """What stands at the top."""
+    """List the numbers at the top."""
     out = []
     if m.sigma is not None:
         for k, name in enumerate(m.names):
@@ -235,14 +233,14 @@ def _error(sigma: float | None, factor: float) -> str:
 
 
 def flags(m: Measurement) -> list[tuple[str, int, str]]:
-    """What was said of how many frames, and of which first."""
+    """List the flags with their number of frames and the time of the first."""
     said = Counter(str(f) for f in m.flag if f)
     first = {f: int(np.flatnonzero(m.flag == f)[0]) for f in said}
     return [(f, n, f"{m.t[first[f]]:.2f} s") for f, n in said.most_common(12)]
 
 
 def chosen(m: Measurement) -> list[tuple[int, str]]:
-    """Frames that are worth a look, each with why."""
+    """Choose frames that are worth a look, each with the reason."""
     q, seen = m.quality, np.flatnonzero(m.seen)
     picked: dict[int, str] = {}
     lost = [k for k in range(len(m)) if not m.seen[k]]
@@ -265,7 +263,7 @@ def chosen(m: Measurement) -> list[tuple[int, str]]:
 
 
 def frames(video: str | os.PathLike[str], m: Measurement) -> tuple[Figure, ...]:
-    """These frames with what was found drawn upon them."""
+    """Draw the measured positions on the chosen frames."""
     import cv2
 
     from udd.tracking import pictures_at, pixels
@@ -286,7 +284,7 @@ def frames(video: str | os.PathLike[str], m: Measurement) -> tuple[Figure, ...]:
 
 
 def motion(m: Measurement) -> Image:
-    """The coordinates over time."""
+    """Draw the coordinates over time."""
     figure, grid = blank(9.0, 1.5 * len(m.names) + 0.7, rows=len(m.names))
     for k, ((ax,), name) in enumerate(zip(grid, m.names, strict=True)):
         said, unit, factor = AXES.get(name, (name, "mrad", 1e3))  # th1, th2 of two bobs
@@ -296,11 +294,11 @@ def motion(m: Measurement) -> Image:
         _strips(ax, m)
         tidy(ax)
     grid[-1][0].set_xlabel(label("t"))
-    return png(figure, "What was measured over time; red strips are frames without a position")
+    return png(figure, "The measured motion over time; red strips are frames without a position")
 
 
 def _strips(ax: Axes, m: Measurement) -> None:
-    """Where nothing is known."""
+    """Mark the times without a position."""
     half = 0.5 * float(np.median(np.diff(m.t)))
     lost = np.flatnonzero(~m.seen)
     for part in np.split(lost, np.flatnonzero(np.diff(lost) > 1) + 1) if len(lost) else []:
@@ -378,7 +376,7 @@ def picture_map(m: Measurement, detail: Tracking | None) -> Image:
 
 
 def rolling(checked: Health) -> Image:
-    """What is left of the rolling constraint over time."""
+    """Draw the violation of the rolling constraint over time."""
     figure, grid = blank(9.0, 3.4, rows=2)
     for k, ((ax,), name) in enumerate(zip(grid, ("Y", "Z"), strict=True)):
         said, unit, factor = CHANNELS[name]
@@ -388,4 +386,6 @@ def rolling(checked: Health) -> Image:
         ax.set_ylabel(f"{said} [{unit}]")
         tidy(ax)
     grid[-1][0].set_xlabel(label("t"))
-    return png(figure, "What is left of the rolling constraint, with a band of two of its noise")
+    return png(
+        figure, "Violation of the rolling constraint, with a band of two standard deviations of its noise"
+    )

@@ -1,4 +1,4 @@
-"""What the page says in words, and how it writes numbers."""
+"""The sentences of the page, and the format of its numbers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _SYMBOLS = (
 
 @dataclass(frozen=True)
 class Headline:
-    """The numbers that stand at the top."""
+    """The numbers at the top."""
 
     span: str
     before: str
@@ -55,7 +55,7 @@ class Headline:
 
 
 def pretty(text: str) -> Markup:
-    """A formula or a unit as a reader writes it: Greek letters, powers, indices, minus signs."""
+    """Format a formula or a unit: Greek letters, powers, indices, minus signs."""
     result = str(escape(text))
     for pattern, symbol in _SYMBOLS:
         result = re.sub(pattern, symbol, result)
@@ -72,18 +72,18 @@ _ENTERS = {
 
 
 def enters(effect: Effect) -> list[str]:
-    """The equations that an effect changes."""
+    """List the equations that an effect changes."""
     return [_ENTERS[slot] for slot in effect.slots if slot in _ENTERS]
 
 
 def verdict(discovery: Discovery) -> str:
-    """The whole result in a sentence, and a second where the search was not finished."""
+    """Sum up the result in a sentence, and a second one if the search was not finished."""
     said = _verdict(discovery)
     if discovery.stopped is None:
         return said
     return (
         f"{said} The search ended after {discovery.budget:.3g} s, as asked, while "
-        f"{discovery.stopped}; what else may be missing was not tried."
+        f"{discovery.stopped}; further effects were not tried."
     )
 
 
@@ -94,17 +94,17 @@ def _verdict(discovery: Discovery) -> str:
         said = " and ".join(titles)
         return (
             f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "
-            "free runs over the part that was held back do not get better by it beyond doubt."
+            "free runs over the held-out part do not clearly improve."
         )
     if discovery.verdict == "search not finished":
-        return "Whether something is missing is not known yet: nothing was found so far."
+        return "The search has not ended: no missing effect was found so far."
     if not discovery.effects and discovery.verdict != "nothing missing" and discovery.stopped:
-        return "The model lacks something; what, was not found so far."
+        return "The model lacks something, but the search has not yet found what."
     if not discovery.effects and discovery.verdict != "nothing missing":
         return "The model lacks something, but no effect of the library explains what."
     if discovery.verdict == "nothing missing" and not reaches_noise_floor(discovery):
         return (
-            "Nothing that the library holds is missing beyond doubt; yet the known model does not explain "
+            "No effect of the library is clearly missing; yet the known model does not explain "
             "this motion down to the noise of the measurement."
         )
     if discovery.verdict == "nothing missing":
@@ -117,7 +117,7 @@ def _verdict(discovery: Discovery) -> str:
 
 
 def _counted(sentences: list[str]) -> list[str]:
-    """Each sentence once; of terms that one equation has more of, how many."""
+    """Return each sentence once, with the number of terms that one equation has more of."""
     counts = {text: sentences.count(text) for text in sentences}
     return [
         text if n == 1 else text.replace(" one more term", f" {n} more terms") for text, n in counts.items()
@@ -133,13 +133,13 @@ def rejected(discovery: Discovery) -> list[str]:
     for near in discovery.rejected:
         numbers = headline(replace(discovery, error_after=near.errors, ratio=near.ratio))
         why = {
-            "chance": f"χ² falls by {near.chi2:.1f} in units of what remains at these frequencies, "
-            f"as by chance with a probability of {probability(near.p)}",
+            "chance": f"χ² decreases by {near.chi2:.1f} in units of the remaining scatter at these "
+            f"frequencies, and the probability of that by chance is {probability(near.p)}",
             "drift": "a slow drift of the sensor's zero would explain more",
-            "part": "the part in which effects are sought does not show it beyond chance",
-            "unconfirmed": "that is not beyond doubt an improvement: it is no finding",
-            "held": "the frames that were held back do not confirm it",
-            "form": "another form fits these data clearly better, and does not pass",
+            "part": "the first part of the record does not show it beyond chance",
+            "unconfirmed": "that is not clearly an improvement",
+            "held": "the held-out frames do not confirm it",
+            "form": "another form fits these data clearly better, and was rejected",
             "records": "only some of the records need it",
         }[near.why]
         key = (numbers.span, numbers.before, numbers.after, numbers.ratio, numbers.interval, why)
@@ -152,13 +152,13 @@ def rejected(discovery: Discovery) -> list[str]:
 
 
 def reaches_noise_floor(discovery: Discovery) -> bool:
-    """Whether the known model's held-out error is no larger than noise makes it, give or take a half."""
+    """Return True if the known model's held-out error is at most 1.5 times the noise floor."""
     e = discovery.error_before
     return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
 
 
 def _meanings(found: AddedEffect, discovery: Discovery) -> list[str]:
-    """What was found, and what acts on the disk identically."""
+    """Describe an added effect and the effects that act identically."""
     same = [
         a.effect
         for a in discovery.alternatives
@@ -171,7 +171,7 @@ def _meanings(found: AddedEffect, discovery: Discovery) -> list[str]:
 
 
 def along(name: str) -> str:
-    """A coordinate in a sentence."""
+    """Name a coordinate in a sentence."""
     return {
         "Y": "the sideways place Y of the disk's centre",
         "Z": "the height Z of the disk's centre",
@@ -185,7 +185,7 @@ def along(name: str) -> str:
 
 
 def values_of(found: AddedEffect, units: dict[str, str]) -> Markup:
-    """An effect's numbers in a sentence."""
+    """List an effect's parameters in a sentence."""
     texts = []
     for name, value in found.parameters.items():
         unit = unit_words(units.get(f"{found.effect.name}.{name}", ""))
@@ -195,13 +195,13 @@ def values_of(found: AddedEffect, units: dict[str, str]) -> Markup:
 
 
 def effect_sentence(effect: Effect) -> str:
-    """What an effect does, as a clause."""
+    """Describe an effect as a clause."""
     meaning = str(effect.meaning).rstrip(".")
     return f"there is {meaning}" if meaning.startswith(("a ", "an ", "dry ")) else meaning
 
 
 def headline(discovery: Discovery) -> Headline:
-    """The held-out errors on which the decision rests."""
+    """Format the held-out errors on which the decision rests."""
     h = discovery.horizon
     before, after = discovery.error_before, discovery.error_after
     unit = before.unit
@@ -223,14 +223,14 @@ def headline(discovery: Discovery) -> Headline:
 
 
 def noise(discovery: Discovery) -> str:
-    """What the frames of each channel are good to, and the steps that they were read in."""
+    """Describe the noise of each channel, and the steps of its readings."""
     said = "; ".join(one.text for one in discovery.noise)
     averaged = discovery.thinned and discovery.thinned[0].every > 1
     return f"{said} (means of {discovery.thinned[0].every} frames)" if averaged else said
 
 
 def length(value: float, unit: str) -> str:
-    """An error with its unit: mm or mrad, or per cent of a motion's spread."""
+    """Format an error with its unit: mm or mrad, or per cent of a motion's spread."""
     if not math.isfinite(value):
         return "–"
     small, factor = small_unit(unit)
@@ -238,7 +238,7 @@ def length(value: float, unit: str) -> str:
 
 
 def _digits(value: float, n: int) -> str:
-    """So many significant digits without an exponent."""
+    """Format a number with so many significant digits, without an exponent."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     decimals = max(0, n - 1 - math.floor(math.log10(abs(value))))
@@ -246,7 +246,7 @@ def _digits(value: float, n: int) -> str:
 
 
 def with_error(value: float, error: float | None) -> str:
-    """A value and its standard error with two digits: ``5.03 ± 0.12``."""
+    """Format a value and its standard error with two digits: ``5.03 ± 0.12``."""
     if error is None or not math.isfinite(error) or error <= 0:
         return f"{value:.5g}".replace("-", "−")
     place = math.floor(math.log10(error))
@@ -260,7 +260,7 @@ def with_error(value: float, error: float | None) -> str:
 
 
 def probability(p: float) -> str:
-    """A small probability as a person says it."""
+    """Format a small probability."""
     if p < 1e-3:
         power = math.floor(math.log10(max(p, 1e-300))) + (1 if p > 1e-300 else 0)
         return Markup(f"below 10<sup>−{-power}</sup>")
@@ -268,52 +268,52 @@ def probability(p: float) -> str:
 
 
 def confirmed_by(effect: AddedEffect) -> str:
-    """What the frames that no fit saw say of an effect."""
+    """Describe the evidence of the held-out frames for an effect."""
     value, low, high = effect.ratio
-    told = (
-        "With all numbers held, the cost of the held-back frames (their squared misfits in units of the "
-        f"noise) became {value:.3g} of what it was (95 % interval {low:.3g} to {high:.3g})"
+    cost = (
+        "With all parameters fixed, the cost of the held-out frames (their squared misfits in units of the "
+        f"noise) changed by the factor {value:.3g} (95 % interval {low:.3g} to {high:.3g})"
     )
     if effect.witness == "held":
-        return f"{told}."
+        return f"{cost}."
     if effect.witness == "fitted":
-        return f"{told}; fitted too, they lowered χ² by more than chance would."
+        return f"{cost}; in a fit that includes them, χ² decreased by more than chance would."
     return (
-        f"{told}: they hardly show it. Each half of the record, in alternate stretches, lowered χ² by more "
-        "than chance would beside the other half."
+        f"{cost}: they hardly show it. In each half of the record, taken in alternate stretches, χ² "
+        "decreased by more than chance would allow, given the other half."
     )
 
 
 def unit_words(unit: str) -> str:
-    """A unit in a sentence: ``1/m`` becomes ``per metre``."""
+    """Write a unit in words: ``1/m`` becomes ``per metre``."""
     return {"1/m": "per metre", "1/s": "per second", "": ""}.get(unit, pretty(unit))
 
 
 def title_of(discovery: Discovery, name: str) -> str:
-    """What a reader calls one of the effects that were found."""
+    """Return the title of an added effect."""
     return next((f.effect.title for f in discovery.effects if f.effect.name == name), name)
 
 
 def limit(other: Alternative) -> str:
-    """Why one alternative stays open."""
+    """Explain why an alternative stays open."""
     if other.likeness > IDENTICAL and other.effect.slots[0].endswith("'"):
         return "On these data the two act identically."
     if other.likeness > IDENTICAL:
         return (
-            "At one drive speed the two act on the disk identically, and no longer record would tell them "
-            "apart: film a second drive and fit both together."
+            "At one drive speed the two act on the disk identically, and a longer record would not "
+            "distinguish them: film a second drive and fit both together."
         )
     if other.nats < -0.1:
         better = f"{abs(other.nats):.1f} units of log-likelihood"
         return f"It fits even better (by {better}), but was not chosen: it fails another test."
     return (
         f"It fits worse by {abs(other.nats):.1f} units of log-likelihood; a form is excluded from 10 on. "
-        "A longer record, or one of a wider range of motion, would settle it."
+        "A longer record, or a wider range of motion, would decide."
     )
 
 
 def command(discovery: Discovery, source: str | None) -> str | None:
-    """What `udd discover` takes to do the same; None where the file is not known."""
+    """Return the command of `udd discover` for the same analysis; None if the file is not known."""
     known = discovery.baseline.problem.models[0]
     if source is None or known.effects or known.profile.written or len(discovery.fit.measurements) > 1:
         return None
@@ -327,31 +327,33 @@ def command(discovery: Discovery, source: str | None) -> str | None:
 
 
 def short_limits(discovery: Discovery) -> list[str]:
-    """What must stand beside the verdict, lest it says too much."""
+    """List the limits that must stand next to the verdict."""
     same = [a for a in discovery.alternatives if a.likeness > IDENTICAL]
     if not same:
         return []
     names = " or ".join(
         dict.fromkeys(f"{a.effect.title} ({a.effect.equation})" for a in same if a.effect.title)
     )
-    return [f"At one drive speed it cannot be told from {names}: a film at a second drive would tell."]
+    return [
+        f"At one drive speed it cannot be distinguished from {names}: a film at a second drive would decide."
+    ]
 
 
 def limits(discovery: Discovery) -> list[str]:
-    """What holds for every such page."""
+    """List the limits of the data."""
     result = []
     if discovery.verdict == "nothing missing":
         result.append(
-            "An effect smaller than this record can show may still be there: nothing missing means nothing "
-            "that these data demand."
+            "An effect too small for this record may still be present: “nothing missing” means that these "
+            "data need no further effect."
         )
     if discovery.curves:
         result.append(
-            "Beside the effects of the library, every equation was searched for a smooth curve along each "
-            "coordinate and pair of coordinates. What depends on more at once, or on what came before, is in "
-            "neither."
+            "Besides the effects of the library, every equation was searched for a smooth curve along each "
+            "coordinate and pair of coordinates. Effects of three or more coordinates, or of the past, were "
+            "not searched."
         )
     else:
-        result.append("Only the effects of the library were tried; the table above names the best.")
+        result.append("Only the effects of the library were tried; the table above lists the best.")
     result.append(discovery.fit.model.profile.shown.taken_as_known)
     return result
