@@ -41,7 +41,8 @@ def add(commands: Any) -> None:
         type=Path,
         nargs="?",
         metavar="FILM",
-        help="a film by a camera at rest, the four colour marks in view; or a folder of films",
+        help="a film by a camera at rest, the four colour marks in view; or a folder of films, or of "
+        "the pictures of one film",
     )
     parser.add_argument(
         "--out",
@@ -145,7 +146,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         raise UddError("--slip is an option of --smooth")
     if args.slip is not None:
         number("--slip", args.slip, above=0.0)
-    if args.camera is None and args.file.is_dir():
+    if args.camera is None and args.file.is_dir() and not _of_pictures(args.file):
         return _folder(args)
     if args.out is not None:
         require_writable(args.out)
@@ -193,6 +194,13 @@ def run(args: argparse.Namespace) -> CommandResult:
             sys.stdout.write(table.read_text(encoding="utf-8"))
         print(f"udd: {text}", file=sys.stderr)
     return CommandResult("", data, _code(m))
+
+
+def _of_pictures(folder: Path) -> bool:
+    """Return True if a folder holds pictures of one film, and no films."""
+    from udd.video.decoder_process import images_in
+
+    return bool(images_in(str(folder))) and not any(is_film(file) for file in folder.iterdir())
 
 
 def _explain(args: argparse.Namespace, options: dict[str, Any], reason: str) -> None:

@@ -171,7 +171,7 @@ def _data(report: Report) -> list[tuple[str, str]]:
 
 def identity(path: str | os.PathLike[str] | None) -> tuple[str, str] | None:
     """Return a file's name and SHA-256."""
-    if path is None:
+    if path is None or Path(path).is_dir():  # of pictures
         return None
     try:
         with Path(path).open("rb") as file:

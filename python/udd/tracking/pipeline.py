@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
@@ -90,7 +91,8 @@ def track(
     Parameters
     ----------
     video : path
-        A film by a camera at rest, showing the whole disk with square marks red, orange, blue,
+        A film by a camera at rest, or a folder of its pictures by number (then give `fps`). It shows the
+        whole disk with square marks red, orange, blue,
         green (clockwise) near its rim, or with those of `layout`.
     disk_radius : float, optional
         Radius of the disk [m], 0.08 if not given; with the marks' distance it sets the scale.
@@ -475,7 +477,8 @@ def pictures_at(
 
 def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> Film:
     """Open a film with the corrections of a measurement."""
-    film = Film(video)
+    rate = 1.0 if tracked is None else float(tracked.meta["fps"])
+    film = Film(video, fps=rate if Path(video).is_dir() else None)  # pictures have no times
     if tracked is not None:
         film.correct = correction_of(tracked.meta, tracked.quality, film.full_range)
     return film

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import struct
 import sys
 import tempfile
@@ -29,6 +30,8 @@ NO_FILM = "is not a film that can be decoded, or it is cut off"
 LOOK = "look"
 MOST_BROKEN = 200  # consecutive undecodable packets after which a film is given up
 MOST_PIXELS = 1 << 26  # of a picture
+#: Endings of pictures, a folder of which is a film.
+IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 #: Formats that are lists of other files, which a film that came from anywhere must not have read.
 LISTS = {"concat", "dash", "hls", "imf", "lavfi", "rtsp", "sdp"}
 
@@ -47,6 +50,9 @@ def main(path: str, memory: int) -> None:
 def answer(path: str, request: str) -> None:
     """Look at the film, or decode it."""
     try:
+        if os.path.isdir(path):
+            answer_of_folder(path, request)
+            return
         with opened(path) as container:
             stream = container.streams.video[0]
             said = facts(stream)
@@ -63,6 +69,53 @@ def answer(path: str, request: str) -> None:
                 send(container, stream, float(request))
     except Refused as error:
         put(json.dumps({"error": str(error)}).encode() + b"\n")
+
+
+def answer_of_folder(path: str, request: str) -> None:
+    """Look at a folder of pictures, or decode them; their times are their numbers."""
+    import av
+
+    files = images_in(path)
+    if not files:
+        raise Refused("is a folder without films or pictures")
+    first, said = image(files[0])
+    said |= {"frames": len(files), "packets": len(files), "fps": None}
+    if request == LOOK:
+        put(json.dumps(said | {"capture_fps": None, "stamps": 0, "tick": 0.0}).encode() + b"\n")
+        return
+    put(json.dumps(said).encode() + b"\n")
+    broken = 0
+    for number, file in enumerate(files):
+        try:
+            frame, damaged = image(file)[0], False
+        except Refused:
+            frame, damaged, broken = av.VideoFrame(first.width, first.height, "yuv420p"), True, broken + 1
+        put_frame(number, float(number), frame, damaged, 0)
+    put(HEAD.pack(-1, 0.0, broken, 0, 0, 0, 0, False))
+
+
+def images_in(folder: str) -> list[str]:
+    """Return the pictures in a folder, in the order of the numbers in their names."""
+    names = [name for name in os.listdir(folder) if name.lower().endswith(IMAGES)]
+    names.sort(key=lambda name: [int(x) if x.isdigit() else x for x in re.split("([0-9]+)", name)])
+    return [os.path.join(folder, name) for name in names]
+
+
+def image(path: str) -> tuple[Any, dict[str, Any]]:
+    """Return a picture from its file, and the entries of its header."""
+    import av
+
+    try:
+        with av.open(path, metadata_errors="ignore", options={"pattern_type": "none"}) as container:
+            stream = container.streams.video[0]
+            if stream.width * stream.height > MOST_PIXELS:
+                raise Refused(
+                    f"has pictures of {stream.width} x {stream.height} pixels, more than can be tracked"
+                )
+            said = facts(stream)
+            return next(container.decode(stream)), said
+    except (av.error.FFmpegError, OSError, ValueError, IndexError, StopIteration):
+        raise Refused(f"holds {os.path.basename(path)}, which is not a picture that can be decoded") from None
 
 
 def put(data: Any) -> None:
@@ -149,16 +202,19 @@ def send(container: Any, stream: Any, since: float) -> None:
     """Write all pictures, then the end with the number of packets that did not decode."""
     broken, standard = [0], StandardLight(stream)
     for index, t, frame, damaged in pictures(container, stream, since, broken):
-        rotation = frame.rotation or 0
-        frame = standard(frame)
-        if frame.format.name not in ("yuv420p", "yuvj420p"):
-            frame = frame.reformat(format="yuv420p")
-        y, u, v = frame.planes[:3]
-        turns = round(rotation / 90) % 4  # phones note their orientation
-        put(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
-        for plane in (y, u, v):
-            put(pixels(plane))
+        turns = round((frame.rotation or 0) / 90) % 4  # phones note their orientation
+        put_frame(index, t, standard(frame), damaged, turns)
     put(HEAD.pack(-1, 0.0, broken[0], 0, 0, 0, 0, False))
+
+
+def put_frame(index: int, t: float, frame: Any, damaged: bool, turns: int) -> None:
+    """Write one picture: its head and its planes."""
+    if frame.format.name not in ("yuv420p", "yuvj420p"):
+        frame = frame.reformat(format="yuv420p")
+    y, u, v = frame.planes[:3]
+    put(HEAD.pack(index, t, y.height, y.width, u.height, u.width, turns, damaged))
+    for plane in (y, u, v):
+        put(pixels(plane))
 
 
 def pixels(plane: Any) -> memoryview | bytearray:

@@ -19,7 +19,7 @@ from udd._util.child_process import ChildProcess
 from udd._util.steady_clock import steady_clock
 from udd.errors import TrackError as TrackError
 
-from .decoder_process import HEAD, LOOK, NO_FILM
+from .decoder_process import HEAD, LOOK, NO_FILM, images_in
 from .srgb import light_of
 
 Plane = NDArray[np.uint8]
@@ -118,11 +118,14 @@ class Film:
         self.path = Path(path)
         if not self.path.exists():
             raise TrackError(f"{self.path}: there is no such file")
-        if self.path.is_dir():
-            raise TrackError(f"{self.path} is a folder, not a film")
-        if not self.path.is_file():
+        folder = self.path.is_dir()
+        if folder and not images_in(str(self.path)):
+            raise TrackError(f"{self.path} is a folder, not a film, and holds no pictures")
+        if folder and fps is None:
+            raise TrackError(f"{self.path} is a folder of pictures, which have no times: give fps")
+        if not folder and not self.path.is_file():
             raise TrackError(f"{self.path} is a device or a pipe, not a regular file: save the film first")
-        if self.path.stat().st_size == 0:
+        if not folder and self.path.stat().st_size == 0:
             raise TrackError(f"{self.path}: the file is empty")
         rates = None if fps is None else frame_rates(fps)
         if find_spec("av") is None:  # the decoder runs in another process, which could not raise this
