@@ -138,3 +138,37 @@ impl Kinks {
         Some(self.surfaces.len() - 1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formula::Names;
+
+    /// Whether the function of a formula's last surface is steady.
+    fn steady(text: &str) -> bool {
+        let (states, parameters) = (["x", "v"].map(str::to_owned), ["k"].map(str::to_owned));
+        let names = Names { states: &states, parameters: &parameters, inputs: &[], rates: false };
+        let mut formula = Expression::parse(text, names).unwrap();
+        let mut kinks = Kinks::default();
+        kinks.of(&mut formula);
+        *kinks.steady.last().unwrap()
+    }
+
+    /// Without this a run along the disk's friction law as text looked for crossings at many places of every step.
+    #[test]
+    fn a_kink_within_a_surface_is_linear_on_either_side() {
+        for text in [
+            "max(k - 2*abs(v), 1)",
+            "min(x + max(v, 0), k)",
+            "where(x - where(v > 0, v, 2*v) > 0, 1, 2)",
+            "abs(x + sign(v))",
+        ] {
+            assert!(steady(text), "{text}");
+        }
+        for text in
+            ["max(k - v*abs(v), 1)", "max(where(v > 0, x^2, x), 0)", "abs(sin(abs(x)))", "max(abs(v)^2, k)"]
+        {
+            assert!(!steady(text), "{text}");
+        }
+    }
+}

@@ -227,16 +227,18 @@ impl Expression {
 
     /// Whether it is a linear function of the state and a constant, with factors that neither time nor inputs change.
     pub fn is_affine(&self) -> bool {
-        self.degree(2) == 1
+        self.degree(2, false) == 1
     }
 
-    /// Whether it is a constant or a linear function of the state and of time: no faster than the state.
+    /// Returns true if it is a constant or a linear function of the state and of time on given sides of all surfaces: no
+    /// faster than the state.
     pub fn is_steady(&self) -> bool {
-        self.degree(1) <= 1
+        self.degree(1, true) <= 1
     }
 
-    /// Its degree in the state, where that of time counts as this; 2 for all that is neither constant nor linear.
-    fn degree(&self, time: u8) -> u8 {
+    /// Its degree in the state, where that of time counts as this; 2 for all that is neither constant nor linear. Kinks
+    /// count as on one side of their surfaces if `sided`.
+    fn degree(&self, time: u8, sided: bool) -> u8 {
         // One for each number on the stack.
         let mut degrees: Vec<u8> = Vec::new();
         for op in &self.ops {
@@ -246,6 +248,9 @@ impl Expression {
                 Op::Push(Leaf::State(_)) => 1,
                 Op::Push(Leaf::Number(_) | Leaf::Parameter(_)) => 0,
                 Op::Push(Leaf::Time) => time,
+                Op::On(Kink::Sign, _) if sided => 0,
+                Op::On(Kink::Where, _) if sided => of[1].max(of[2]),
+                Op::On(Kink::Abs | Kink::Min | Kink::Max, _) if sided => most,
                 Op::Push(_) | Op::On(..) | Op::Where => 2,
                 Op::Unary(Unary::Neg) | Op::Binary(Binary::Add | Binary::Sub) => most,
                 Op::Binary(Binary::Mul) => of.iter().sum::<u8>().min(2),
