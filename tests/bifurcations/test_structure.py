@@ -588,7 +588,7 @@ def test_multipliers_that_break_liouvilles_formula_bring_no_bifurcation(
 ) -> None:
     from dataclasses import replace
 
-    from udd.bifurcations import bifurcation_functions, floquet_multipliers
+    from udd.bifurcations import floquet_multipliers, orbit_geometry, shooting_curve
 
     orbit, right = udd.periodic_orbit(udd.DLE(7.3)), floquet_multipliers.multipliers_at
 
@@ -596,8 +596,8 @@ def test_multipliers_that_break_liouvilles_formula_bring_no_bifurcation(
         found = right(curve, u)  # type: ignore[arg-type]
         return replace(found, log=found.log + np.array([0.0, 5.0]))
 
-    monkeypatch.setattr(floquet_multipliers, "multipliers_at", wrong)
-    monkeypatch.setattr(bifurcation_functions, "multipliers_at", wrong)
+    monkeypatch.setattr(orbit_geometry, "multipliers_at", wrong)
+    monkeypatch.setattr(shooting_curve, "multipliers_at", wrong)
     assert udd.continuation(orbit, "w", (6.9, 7.4)).find("symmetry breaking") == []
 
 

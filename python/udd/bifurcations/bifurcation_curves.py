@@ -17,7 +17,6 @@ from udd._util.validation import number, whole
 from udd.errors import IntegrationError, ModelError
 
 from .bifurcation_functions import FUNCTIONS
-from .bifurcation_location import frequency_of
 from .branch import BifurcationPoint
 from .branch_continuation import bounds_of, in_unit_of, unit_of
 from .branch_ends import hopf_end, vanishing_part
@@ -278,7 +277,7 @@ class _Trace:
 def _note(surface: SolutionSurface, kind: str, point: SurfacePoint) -> _Note:
     u, frequency = point.v[:-1], float("nan")
     if FUNCTIONS[kind] == "complex_pair":
-        frequency = frequency_of(point.curve, u, point.functions)
+        frequency = point.curve.frequency(u, point.functions)
     return _Note(surface.values(point), solution_at(point.curve, u), frequency)
 
 

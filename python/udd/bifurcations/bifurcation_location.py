@@ -9,13 +9,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy import optimize
 
-from .bifurcation_functions import TestFunctions, test_functions_at
+from .bifurcation_functions import STILL, TestFunctions
 from .branch import AnyCurve, BifurcationPoint
-from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import COARSE, rounding_of
-from .floquet_multipliers import as_liouville
 from .flow_map import Floats
+from .orbit_geometry import as_liouville
 from .pseudo_arclength import CorrectorFailed, CurvePoint, nearest_of_family, newton_corrector, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
@@ -23,15 +22,12 @@ from .solutions import Equilibrium, PeriodicOrbit
 __all__ = [
     "bifurcations_between",
     "changes",
-    "frequency_of",
     "locate",
     "location_error",
     "pitchfork_at",
     "point_at",
 ]
 
-_TURNING = 1e-6  # a pair with a smaller imaginary part (in radians) is none
-_STILL = 1e-5  # a tangent with less of the parameter
 _NODES = 12  # points of a curve about a pitchfork,
 _ENOUGH = 8  # of which so many at least
 _SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
@@ -67,50 +63,23 @@ def bifurcations_between(
         if (
             name == "fold"
             and "unit_multiplier" not in changed
-            and max(abs(before.fold), abs(after.fold)) < _STILL
+            and max(abs(before.fold), abs(after.fold)) < STILL
         ):
             continue
         try:
             if name == "fold" and "unit_multiplier" not in changed:
                 sigma, place = turning(curve, a, step, before, after)
-                found.append(("end", sigma, place, test_functions_at(curve, place)))
+                found.append(("end", sigma, place, curve.test_functions(place)))
                 continue
             sigma, place = locate(curve, a, step, name)
         except (CorrectorFailed, ValueError):
             continue
-        here = test_functions_at(curve, place)
+        here = curve.test_functions(place)
         if isinstance(curve, PeriodicOrbitCurve) and not as_liouville(curve, place.u):
             continue
-        if name == "fold":
-            kind = "fold"
-        elif name == "unit_multiplier":
-            # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
-            turns = abs(here.fold) <= _STILL and not isinstance(curve, FamilyCurve)
-            kind = "fold" if turns else "branch point"
-        elif name == "period_doubling":
-            symmetric = isinstance(curve, PeriodicOrbitCurve) and curve.symmetric
-            kind = "symmetry breaking" if symmetric else "period doubling"
-        elif name == "collision":
-            if not 1e-6 < abs(np.angle(here.pair)) < np.pi - 1e-6 or abs(abs(here.pair) - 1.0) > 1e-3:
-                continue  # on the real axis: unstable before and after
-            kind = "Krein collision"
-        else:
-            pair = here.pair
-            if (
-                isinstance(curve, EquilibriumCurve)
-                and abs(pair.imag) * curve.flow.clock > _TURNING
-                and _on_axis(pair)
-            ):
-                kind = "Hopf"
-            elif (
-                isinstance(curve, PeriodicOrbitCurve)
-                and abs(np.angle(pair)) > _TURNING
-                and abs(abs(pair) - 1.0) < 1e-5
-            ):
-                kind = "Neimark-Sacker"
-            else:
-                continue  # two real ones: a neutral saddle
-        found.append((kind, sigma, place, here))
+        kind = curve.kind_at(name, here)
+        if kind:
+            found.append((kind, sigma, place, here))
     return sorted(found, key=lambda one: one[1])
 
 
@@ -127,7 +96,7 @@ def turning(
             place = CurvePoint(u, tangent_at(curve, u, a.tangent))
         except CorrectorFailed:
             break
-        fold = test_functions_at(curve, place).fold
+        fold = curve.test_functions(place).fold
         if abs(fold) > max(abs(before.fold), abs(after.fold)):
             # On the other branch: the equations are singular here, and this is the place.
             return middle, CurvePoint(a.u + middle * a.tangent, a.tangent)
@@ -188,15 +157,11 @@ def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, 
     table = chebyshev.chebfit(distances, points, degree)
     slope = chebyshev.chebder(table)
     roots = chebyshev.chebroots(slope[:, -1])
-    real = roots.real[(np.abs(roots.imag) < _STILL) & (np.abs(roots.real) < 1.0)]
+    real = roots.real[(np.abs(roots.imag) < STILL) & (np.abs(roots.real) < 1.0)]
     if not len(real):
         raise CorrectorFailed("the parameter does not turn there")
     x = float(real[np.argmin(np.abs(real))])
     return x, np.asarray(chebyshev.chebval(x, table)), np.asarray(chebyshev.chebval(x, slope))
-
-
-def _on_axis(pair: complex) -> bool:
-    return abs(pair.real) < 1e-6 * abs(pair.imag)
 
 
 def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
@@ -212,7 +177,7 @@ def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[floa
     def at(sigma: float) -> float:
         u = _beside(curve, a, sigma)
         cache[sigma] = CurvePoint(u, tangent_at(curve, u, a.tangent))
-        return float(getattr(test_functions_at(curve, cache[sigma]), name))
+        return float(getattr(curve.test_functions(cache[sigma]), name))
 
     sigma = float(optimize.brentq(at, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
     if sigma not in cache:
@@ -252,7 +217,7 @@ def location_error(
     def at(distance: float, own: PeriodicOrbitCurve = curve) -> tuple[float, Floats]:
         u = _beside(own, a, distance)
         there = CurvePoint(u, tangent_at(own, u, a.tangent))
-        return float(getattr(test_functions_at(own, there), name)), np.array([own.value(u), own.period(u)])
+        return float(getattr(own.test_functions(there), name)), np.array([own.value(u), own.period(u)])
 
     known = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
@@ -279,7 +244,7 @@ def _scatter(
     seen = []
     for distance in sigma + _NEAR * step * near:
         u = newton_corrector(curve, a.u + distance * a.tangent, a.tangent)
-        signs = test_functions_at(curve, CurvePoint(u, tangent_at(curve, u, a.tangent)))
+        signs = curve.test_functions(CurvePoint(u, tangent_at(curve, u, a.tangent)))
         turning = abs(signs.pair.imag)
         period = 2.0 * np.pi / turning if name == "complex_pair" and turning else np.nan
         seen.append((float(getattr(signs, name)), curve.value(u), period))
@@ -291,13 +256,6 @@ def _scatter(
     off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
     value, period = _SURE * (noise[1:] + off * slope[1:])
     return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(table[0, 2]))
-
-
-def frequency_of(curve: AnyCurve, u: Floats, signs: TestFunctions) -> float:
-    """Return the frequency of the pair that bifurcates there, per unit of time."""
-    if isinstance(curve, PeriodicOrbitCurve):
-        return float(np.angle(signs.pair)) / curve.span(u)
-    return signs.pair.imag
 
 
 def point_at(
@@ -312,7 +270,7 @@ def point_at(
     """The point with what belongs to its kind."""
     frequency = coefficient = float("nan")
     if kind in ("Hopf", "Neimark-Sacker"):
-        frequency = frequency_of(curve, place.u, signs)
+        frequency = curve.frequency(place.u, signs)
     if kind == "Hopf" and isinstance(solution, Equilibrium):
         coefficient = solution.lyapunov_coefficient
     value = curve.value(place.u)

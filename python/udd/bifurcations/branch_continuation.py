@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
@@ -15,9 +14,8 @@ from udd._util.validation import number, whole
 from udd.errors import ModelError
 from udd.models import Model, beyond_the_edge
 
-from .bifurcation_functions import TestFunctions
 from .branch import AnyCurve, BifurcationPoint, Branch
-from .branch_following import CLOSED, BranchTrace, ContinuationLimits, follow_branch
+from .branch_following import CLOSED, BranchTrace, ContinuationLimits, Station, follow_branch
 from .branch_switching import born_at
 from .conservative_families import PERIOD, Conserved, FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
@@ -248,12 +246,11 @@ def _at(
 
 def branch_from(ways: list[BranchTrace], model: Model, parameter: str, begin: str) -> Branch:
     """The branch made of one way, or of two that begin at the same place, the first of them turned round."""
-    entries: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]]
     if len(ways) == 2:
         back, on = ways
         length = back.places[-1][3]
-        turned = [(c, CurvePoint(p.u, -p.tangent), s, length - a) for c, p, s, a in reversed(back.places)]
-        entries = [*turned[:-1], *((c, p, s, length + a) for c, p, s, a in on.places)]
+        turned = [Station(c, CurvePoint(p.u, -p.tangent), s, length - a) for c, p, s, a in back.places[::-1]]
+        entries = [*turned[:-1], *(Station(c, p, s, length + a) for c, p, s, a in on.places)]
         points = [replace(p, arclength=length - p.arclength) for p in reversed(back.points)]
         points += [replace(p, arclength=length + p.arclength) for p in on.points]
         ends = (back.end, on.end)
@@ -261,38 +258,18 @@ def branch_from(ways: list[BranchTrace], model: Model, parameter: str, begin: st
         way = ways[0]
         entries, points, ends = way.places, way.points, (CLOSED if way.end == CLOSED else begin, way.end)
     values = np.array([curve.value(place.u) for curve, place, _, _ in entries])
-    symmetric = False
-    multipliers, states, periods = [], [], []
-    for curve, place, signs, _ in entries:
-        own = signs.values
-        if isinstance(curve, PeriodicOrbitCurve):
-            symmetric = curve.symmetric
-            own = own**2 + 0.0 if symmetric else own
-            state = curve.flow.full(curve.nodes(place.u)[0])
-            periods.append(curve.period(place.u))
-        else:
-            state = curve.flow.full(curve.state(place.u))
-            mirror = curve.flow.mirror
-            if mirror is not None:
-                symmetric = bool(np.allclose(mirror * curve.state(place.u), curve.state(place.u), atol=1e-12))
-            periods.append(np.nan)
-        states.append(state)
-        key = -np.abs(own) if isinstance(curve, PeriodicOrbitCurve) else -own.real
-        multipliers.append(own[np.argsort(key, kind="stable")])
-    table = np.array(multipliers)
-    cycle = isinstance(entries[0][0], PeriodicOrbitCurve)
-    inside = np.abs(table) < 1 if cycle else table.real < 0
-    stable: NDArray[np.bool_] = np.all(inside, axis=1)
+    table = np.array([curve.ordered(signs.values) for curve, _, signs, _ in entries])
+    first, last, place = entries[0][0], *entries[-1][:2]
     return Branch(
         model,
         parameter,
-        "cycle" if cycle else "equilibrium",
+        first.kind,
         values,
-        np.array(states),
-        np.array(periods),
+        np.array([curve.first_state(place.u) for curve, place, _, _ in entries]),
+        np.array([curve.period(place.u) for curve, place, _, _ in entries]),
         table,
-        stable,
-        symmetric,
+        first.stable(table),
+        last.mirrors_itself(place.u),
         np.array([a for _, _, _, a in entries]),
         tuple(points),
         ends,

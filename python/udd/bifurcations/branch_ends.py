@@ -6,7 +6,7 @@ import numpy as np
 
 from udd.errors import IntegrationError
 
-from .bifurcation_functions import FUNCTIONS, test_functions_at
+from .bifurcation_functions import FUNCTIONS
 from .bifurcation_location import bifurcations_between, location_error, point_at
 from .branch import AnyCurve, BifurcationPoint
 from .branch_solutions import solution_at
@@ -91,10 +91,10 @@ def _nearest(curve: AnyCurve, guess: Floats, kind: str, step: float) -> Bifurcat
         try:
             u = newton_corrector(curve, guess, natural_constraint(guess), patience=20)
             here, size = CurvePoint(u, sense * tangent_at(curve, u, natural_constraint(u))), step
-            signs = test_functions_at(curve, here)
+            signs = curve.test_functions(here)
             for _ in range(_STEPS):
                 there, gone, size = predictor_corrector_step(curve, here, size, step)
-                after = test_functions_at(curve, there)
+                after = curve.test_functions(there)
                 met = [one for one in bifurcations_between(curve, here, gone, signs, after) if one[0] == kind]
                 if met:
                     _, sigma, place, at = met[0]

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from udd.errors import IntegrationError
 
-from .bifurcation_functions import FUNCTIONS, TestFunctions, test_functions_at
+from .bifurcation_functions import FUNCTIONS, TestFunctions
 from .bifurcation_location import bifurcations_between, location_error, pitchfork_at, point_at
 from .branch import AnyCurve, BifurcationPoint
 from .branch_ends import closes, hopf_end, origin_of, size_of, vanishing_part
@@ -19,6 +20,7 @@ from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import rounding_of
+from .flow_map import Floats
 from .nonsmooth import corner_ahead
 from .periodic_orbits import pieces_for
 from .pseudo_arclength import (
@@ -31,7 +33,7 @@ from .pseudo_arclength import (
 )
 from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["CLOSED", "BranchTrace", "ContinuationLimits", "follow_branch"]
+__all__ = ["CLOSED", "BranchTrace", "ContinuationLimits", "Station", "follow_branch"]
 
 _WATCHED = 6  # points in which a branch shows that it comes to a connection,
 _CONVERGED = 1e-11  # by this relative change of its parameter
@@ -62,216 +64,198 @@ class ContinuationLimits:
     until: Callable[[BifurcationPoint], bool]
 
 
+class Station(NamedTuple):
+    """A point of a branch: its curve, the test functions there, and how far along the branch it lies."""
+
+    curve: AnyCurve
+    place: CurvePoint
+    functions: TestFunctions
+    arclength: float
+
+
 @dataclass
 class BranchTrace:
     """One direction of a branch: points with their arclength, bifurcations, and why it ends."""
 
-    places: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]]
+    places: list[Station]
     points: list[BifurcationPoint]
-    end: str = ""
+    end: str
 
 
 def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits) -> BranchTrace:
     """Follow a branch from `start` in the direction of its tangent."""
-    here, step, arclength = start, limits.step, 0.0
-    signs = test_functions_at(curve, here)
-    way = BranchTrace([(curve, here, signs, 0.0)], [])
-    while True:
+    way = _Way([Station(curve, start, curve.test_functions(start), 0.0)], [], "", limits)
+    here, step = way.places[0], limits.step
+    while not way.end:
         if len(way.places) > limits.most:
             way.end = "as many points as were wanted"
-            return way
-        if isinstance(curve, EquilibriumCurve):
-            corner = corner_ahead(curve, here, step)
+            break
+        if isinstance(here.curve, EquilibriumCurve):
+            corner = corner_ahead(here.curve, here.place, step)
             if corner is not None:
-                here, signs, arclength = _round_corner(curve, corner, way, limits, arclength, here)
-                step = min(step, limits.step)
-                if way.end:
-                    return way
+                here, step = way.round_corner(here, corner), min(step, limits.step)
                 continue
+        here, step = way.step_from(here, step)
+    return way
+
+
+@dataclass
+class _Way(BranchTrace):
+    """A branch that is being followed within limits."""
+
+    limits: ContinuationLimits
+
+    def step_from(self, here: Station, step: float) -> tuple[Station, float]:
+        """Return the next point, after its bifurcations are noted, and the step to be tried next."""
+        curve, place, limits = here.curve, here.place, self.limits
         try:
-            there, gone, step = predictor_corrector_step(curve, here, step, limits.longest)
-            after = test_functions_at(curve, there)
+            there, gone, step = predictor_corrector_step(curve, place, step, limits.longest)
+            after = curve.test_functions(there)
         except (CorrectorFailed, IntegrationError) as error:
-            small = isinstance(curve, PeriodicOrbitCurve) and size_of(curve, here.u) < _SMALL
-            if not small or not _record_hopf(curve, here, 0.0, signs, way, limits, arclength):
-                way.end = f"lost: {error}"
-            return way
-        part = vanishing_part(curve, here.u, there.u)
-        if part is not None and _record_hopf(curve, here, part * gone, signs, way, limits, arclength):
-            return way
-        _locate_bifurcations(curve, here, gone, signs, after, way, limits, arclength)
-        if way.end:
-            return way
-        value = curve.value(there.u)
-        if not limits.low <= value <= limits.high:
-            way.end = f"{curve.name} = {_end_at_bound(curve, here, gone, way, arclength, limits):.6g}"
-            return way
-        arclength += gone
-        if len(way.places) > _LOOP and closes(way.places[0][:2], curve, here, there, gone):
-            way.places.append((curve, there, after, arclength))
-            way.points = _once(way.points)
-            way.end = CLOSED
-            return way
+            small = isinstance(curve, PeriodicOrbitCurve) and size_of(curve, place.u) < _SMALL
+            if not small or not self.ends_at_hopf(here, 0.0):
+                self.end = f"lost: {error}"
+            return here, step
+        part = vanishing_part(curve, place.u, there.u)
+        if part is not None and self.ends_at_hopf(here, part * gone):
+            return here, step
+        self.locate(here, gone, after)
+        if self.end or self.leaves_bounds(here, gone, there.u):
+            return here, step
+        arclength = here.arclength + gone
+        if len(self.places) > _LOOP and closes(self.places[0][:2], curve, place, there, gone):
+            self.places.append(Station(curve, there, after, arclength))
+            self.points, self.end = _once(self.points), CLOSED
+            return here, step
         if isinstance(curve, PeriodicOrbitCurve):
             if curve.period(there.u) > limits.period:
-                way.places.append((curve, there, after, arclength))
-                way.end = f"the period exceeds {limits.period:.6g}"
-                return way
+                self.places.append(Station(curve, there, after, arclength))
+                self.end = f"the period exceeds {limits.period:.6g}"
+                return here, step
             # A new plane for the phase, and a finer mesh where the orbit has grown long.
             curve, there = _prepared(curve, there)
             if not isinstance(curve, FamilyCurve):
                 after = replace(after, fold=float(there.tangent[-1]))
-        here, signs = there, after
-        way.places.append((curve, here, signs, arclength))
-        if isinstance(curve, PeriodicOrbitCurve) and (near := _connection(way)) is not None:
-            way.end = f"a connection near {near:.13g}: the period grows without bound"
-            return way
+        self.places.append(Station(curve, there, after, arclength))
+        if isinstance(curve, PeriodicOrbitCurve) and (near := _connection(self)) is not None:
+            self.end = f"a connection near {near:.13g}: the period grows without bound"
+        return self.places[-1], step
 
+    def locate(self, here: Station, gone: float, after: TestFunctions) -> None:
+        """Note the bifurcations on a step."""
+        curve, place = here.curve, here.place
+        for kind, sigma, there, signs in bifurcations_between(curve, place, gone, here.functions, after):
+            if kind == "end":
+                # The parameter turns where no multiplier passes 1: the branch meets itself there.
+                self.note_origin(here, gone, sigma, there, signs)
+            else:
+                errors = float("nan"), float("nan")
+                with suppress(CorrectorFailed, IntegrationError):
+                    errors = location_error(curve, place, sigma, there, gone, FUNCTIONS[kind])
+                self.note(Station(curve, there, signs, here.arclength + sigma), kind, errors)
+            if self.end:
+                return
 
-def _locate_bifurcations(
-    curve: AnyCurve,
-    here: CurvePoint,
-    gone: float,
-    before: TestFunctions,
-    after: TestFunctions,
-    way: BranchTrace,
-    limits: ContinuationLimits,
-    arclength: float,
-) -> None:
-    """Note the bifurcations on a step."""
-    for kind, sigma, place, signs in bifurcations_between(curve, here, gone, before, after):
-        if kind == "end":
-            # The parameter turns where no multiplier passes 1: the branch meets itself there.
-            _record_origin(curve, here, gone, sigma, place, signs, way, limits, arclength)
-        else:
-            errors = _errors(curve, here, sigma, place, gone, kind)
-            _record_point(curve, place, signs, kind, errors, way, limits, arclength + sigma)
-        if way.end:
-            return
-
-
-def _record_hopf(
-    curve: AnyCurve,
-    here: CurvePoint,
-    distance: float,
-    before: TestFunctions,
-    way: BranchTrace,
-    limits: ContinuationLimits,
-    arclength: float,
-) -> bool:
-    """Note the Hopf point to which cycles shrink at a distance from `here`; False if there is none."""
-    if not isinstance(curve, PeriodicOrbitCurve) or isinstance(curve, FamilyCurve):
-        return False
-    try:
-        point = hopf_end(curve, here.u)
-    except (CorrectorFailed, IntegrationError):
-        return False
-    if point is None:
-        return False
-    with suppress(CorrectorFailed, IntegrationError):
-        near = _BEFORE * distance
-        u = newton_corrector(curve, here.u + near * here.tangent, here.tangent)
-        last = CurvePoint(u, tangent_at(curve, u, here.tangent))
-        if near > 0.0 and vanishing_part(curve, here.u, u) is None:
-            after = test_functions_at(curve, last)
-            _locate_bifurcations(curve, here, near, before, after, way, limits, arclength)
-            if way.end:
-                return True
-            if limits.low <= curve.value(u) <= limits.high:
-                way.places.append((curve, last, after, arclength + near))
-    if not limits.low <= point.value <= limits.high:
-        return False
-    way.points.append(replace(point, arclength=arclength + distance))
-    way.end = f"a Hopf bifurcation at {point.value:.10g}"
-    return True
-
-
-def _record_origin(
-    curve: AnyCurve,
-    here: CurvePoint,
-    gone: float,
-    sigma: float,
-    place: CurvePoint,
-    signs: TestFunctions,
-    way: BranchTrace,
-    limits: ContinuationLimits,
-    arclength: float,
-) -> None:
-    """Note the bifurcation at which a side branch turns: it ends there."""
-    value = curve.value(place.u)
-    if isinstance(curve, FamilyCurve):
-        way.places.append((curve, place, signs, arclength + sigma))
-        size = size_of(curve, place.u) / size_of(curve, here.u)
-        way.end = f"{'an equilibrium' if size < _SHRUNK else 'a branch point'} near {value:.5g}"
-        return
-    point = origin_of(curve, place.u, gone) if isinstance(curve, PeriodicOrbitCurve) else None
-    if point is not None:
-        way.places.append((curve, place, signs, arclength + sigma))
-        way.points.append(replace(point, arclength=arclength + sigma))
-        way.end = f"a {point.kind} at {point.value:.10g}"
-        return
-    error = float("nan")
-    # If the curve cannot be followed about it, not even nearer, the place is less accurate.
-    for part in _NEARER:
+    def ends_at_hopf(self, here: Station, distance: float) -> bool:
+        """Note the Hopf point to which cycles shrink at a distance from `here`; False if there is none."""
+        curve, limits = here.curve, self.limits
+        if not isinstance(curve, PeriodicOrbitCurve) or isinstance(curve, FamilyCurve):
+            return False
+        try:
+            point = hopf_end(curve, here.place.u)
+        except (CorrectorFailed, IntegrationError):
+            return False
+        if point is None:
+            return False
         with suppress(CorrectorFailed, IntegrationError):
-            sigma, place, error = pitchfork_at(curve, here, part * gone, sigma)
-            break
-    signs, errors = test_functions_at(curve, place), (error, float("nan"))
-    _record_point(curve, place, signs, "branch point", errors, way, limits, arclength + sigma)
-    way.end = f"a branch point at {curve.value(place.u):.10g}"
+            near = _BEFORE * distance
+            tangent = here.place.tangent
+            u = newton_corrector(curve, here.place.u + near * tangent, tangent)
+            last = CurvePoint(u, tangent_at(curve, u, tangent))
+            if near > 0.0 and vanishing_part(curve, here.place.u, u) is None:
+                after = curve.test_functions(last)
+                self.locate(here, near, after)
+                if self.end:
+                    return True
+                if limits.low <= curve.value(u) <= limits.high:
+                    self.places.append(Station(curve, last, after, here.arclength + near))
+        if not limits.low <= point.value <= limits.high:
+            return False
+        self.points.append(replace(point, arclength=here.arclength + distance))
+        self.end = f"a Hopf bifurcation at {point.value:.10g}"
+        return True
 
+    def note_origin(
+        self, here: Station, gone: float, sigma: float, place: CurvePoint, signs: TestFunctions
+    ) -> None:
+        """Note the bifurcation at which a side branch turns: it ends there."""
+        curve = here.curve
+        there = Station(curve, place, signs, here.arclength + sigma)
+        if isinstance(curve, FamilyCurve):
+            self.places.append(there)
+            size = size_of(curve, place.u) / size_of(curve, here.place.u)
+            what = "an equilibrium" if size < _SHRUNK else "a branch point"
+            self.end = f"{what} near {curve.value(place.u):.5g}"
+            return
+        point = origin_of(curve, place.u, gone) if isinstance(curve, PeriodicOrbitCurve) else None
+        if point is not None:
+            self.places.append(there)
+            self.points.append(replace(point, arclength=there.arclength))
+            self.end = f"a {point.kind} at {point.value:.10g}"
+            return
+        error = float("nan")
+        # If the curve cannot be followed about it, not even nearer, the place is less accurate.
+        for part in _NEARER:
+            with suppress(CorrectorFailed, IntegrationError):
+                sigma, place, error = pitchfork_at(curve, here.place, part * gone, sigma)
+                break
+        there = Station(curve, place, curve.test_functions(place), here.arclength + sigma)
+        self.note(there, "branch point", (error, float("nan")))
+        self.end = f"a branch point at {curve.value(place.u):.10g}"
 
-def _record_point(
-    curve: AnyCurve,
-    place: CurvePoint,
-    signs: TestFunctions,
-    kind: str,
-    errors: tuple[float, float],
-    way: BranchTrace,
-    limits: ContinuationLimits,
-    arclength: float,
-) -> None:
-    """Note a bifurcation point; the way ends with the last one that is wanted."""
-    point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, errors)
-    way.points.append(point)
-    way.places.append((curve, place, signs, arclength))
-    if limits.until(point):
-        way.end = "the point that was wanted"
+    def note(self, there: Station, kind: str, errors: tuple[float, float]) -> None:
+        """Note a bifurcation point; the way ends with the last one that is wanted."""
+        curve, place, signs, arclength = there
+        point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, errors)
+        self.points.append(point)
+        self.places.append(there)
+        if self.limits.until(point):
+            self.end = "the point that was wanted"
 
+    def leaves_bounds(self, here: Station, gone: float, there: Floats) -> bool:
+        """Return True if the branch meets a bound before `there`, and add the point where it does."""
+        curve, place, limits = here.curve, here.place, self.limits
+        if limits.low <= curve.value(there) <= limits.high:
+            return False
+        bound = limits.high if curve.value(place.u + gone * place.tangent) > limits.high else limits.low
+        guess = place.u.copy()
+        if place.tangent[-1] != 0.0:
+            guess = guess + place.tangent * ((bound / curve.scale - guess[-1]) / place.tangent[-1])
+        guess[-1] = bound / curve.scale
+        with suppress(CorrectorFailed, IntegrationError):  # the last point is inside, then
+            u = newton_corrector(curve, guess, natural_constraint(guess))
+            last = CurvePoint(u, tangent_at(curve, u, place.tangent))
+            arclength = here.arclength + float(np.linalg.norm(u - place.u))
+            self.places.append(Station(curve, last, curve.test_functions(last), arclength))
+        self.end = f"{curve.name} = {bound:.6g}"
+        return True
 
-def _errors(
-    curve: AnyCurve, here: CurvePoint, sigma: float, place: CurvePoint, gone: float, kind: str
-) -> tuple[float, float]:
-    try:
-        return location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
-    except (CorrectorFailed, IntegrationError):
-        return float("nan"), float("nan")
-
-
-def _end_at_bound(
-    curve: AnyCurve,
-    here: CurvePoint,
-    gone: float,
-    way: BranchTrace,
-    arclength: float,
-    limits: ContinuationLimits,
-) -> float:
-    """Add the point where the branch meets the bound."""
-    beyond = curve.value(here.u + gone * here.tangent)
-    bound = limits.high if beyond > limits.high else limits.low
-    guess = here.u.copy()
-    if here.tangent[-1] != 0.0:
-        guess = guess + here.tangent * ((bound / curve.scale - guess[-1]) / here.tangent[-1])
-    guess[-1] = bound / curve.scale
-    try:
-        u = newton_corrector(curve, guess, natural_constraint(guess))
-        place = CurvePoint(u, tangent_at(curve, u, here.tangent))
-        way.places.append(
-            (curve, place, test_functions_at(curve, place), arclength + float(np.linalg.norm(u - here.u)))
-        )
-    except (CorrectorFailed, IntegrationError):
-        pass  # the last point is inside
-    return bound
+    def round_corner(self, here: Station, corner: tuple[CurvePoint, CurvePoint]) -> Station:
+        """Go round a corner, where an equilibrium lies on a surface of the law."""
+        curve, (arriving, leaving) = here.curve, corner
+        gone = float(np.linalg.norm(arriving.u - here.place.u))
+        here = here._replace(functions=curve.test_functions(here.place))
+        # On the corner itself rounding would choose the side of the law.
+        at = curve.test_functions(CurvePoint(arriving.u - _ASIDE * arriving.tangent, arriving.tangent))
+        after = curve.test_functions(CurvePoint(leaving.u + _ASIDE * leaving.tangent, leaving.tangent))
+        if gone > _ASIDE:
+            self.locate(here, gone - _ASIDE, at)
+        if self.end or self.leaves_bounds(here, gone, arriving.u):
+            return here
+        kind = "nonsmooth fold" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "border collision"
+        arclength, value = here.arclength + gone, curve.value(arriving.u)
+        self.note(Station(curve, arriving, at, arclength), kind, (float(rounding_of(value)), float("nan")))
+        return Station(curve, leaving, after, arclength)
 
 
 def _prepared(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, CurvePoint]:
@@ -320,33 +304,3 @@ def _once(points: list[BifurcationPoint]) -> list[BifurcationPoint]:
     if len(points) < 2 or first is None or points[-1].kind != first.kind:
         return points
     return points[:-1] if abs(points[-1].value - first.value) < near * (abs(first.value) or 1.0) else points
-
-
-def _round_corner(
-    curve: EquilibriumCurve,
-    corner: tuple[CurvePoint, CurvePoint],
-    way: BranchTrace,
-    limits: ContinuationLimits,
-    arclength: float,
-    here: CurvePoint,
-) -> tuple[CurvePoint, TestFunctions, float]:
-    """Go round a corner, where an equilibrium lies on a surface of the law."""
-    arriving, leaving = corner
-    gone = float(np.linalg.norm(arriving.u - here.u))
-    before = test_functions_at(curve, here)
-    # On the corner itself rounding would choose the side of the law.
-    at = test_functions_at(curve, CurvePoint(arriving.u - _ASIDE * arriving.tangent, arriving.tangent))
-    after = test_functions_at(curve, CurvePoint(leaving.u + _ASIDE * leaving.tangent, leaving.tangent))
-    if gone > _ASIDE:
-        _locate_bifurcations(curve, here, gone - _ASIDE, before, at, way, limits, arclength)
-        if way.end:
-            return here, before, arclength
-    arclength += gone
-    value = curve.value(arriving.u)
-    if not limits.low <= value <= limits.high:
-        way.end = f"{curve.name} = {_end_at_bound(curve, here, gone, way, arclength, limits):.6g}"
-        return here, before, arclength
-    kind = "nonsmooth fold" if arriving.tangent[-1] * leaving.tangent[-1] < 0.0 else "border collision"
-    errors = float(rounding_of(value)), float("nan")
-    _record_point(curve, arriving, at, kind, errors, way, limits, arclength)
-    return leaving, after, arclength

@@ -8,7 +8,6 @@ import numpy as np
 
 from udd.errors import IntegrationError, ModelError
 
-from .bifurcation_functions import test_functions_at
 from .bifurcation_location import changes
 from .branch import AnyCurve, BifurcationPoint
 from .conservative_families import FamilyCurve
@@ -87,7 +86,7 @@ def _nothing_between(
 
     It `begins` at this value of the parameter.
     """
-    before, after = test_functions_at(curve, half), test_functions_at(curve, whole)
+    before, after = curve.test_functions(half), curve.test_functions(whole)
     # A function that vanishes all along, as with a conserved energy, changes its sign by rounding.
     clear = [max(abs(getattr(s, name)) for s in (before, after)) for name in changes(before, after)]
     if any(size > _ROUNDING for size in clear):

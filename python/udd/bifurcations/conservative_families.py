@@ -11,8 +11,11 @@ from udd.errors import ModelError
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
+from .bifurcation_functions import TestFunctions, discriminant, product_less
 from .condensation import CyclicEquations
+from .floquet_multipliers import Multipliers
 from .flow_map import Floats, FlowMap
+from .pseudo_arclength import CurvePoint
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["PERIOD", "Conserved", "FamilyCurve", "in_a_family"]
@@ -206,3 +209,26 @@ class FamilyCurve(PeriodicOrbitCurve):
         matrix[rows, rows] += inside
         matrix[: m * r, -2:] = both.reshape(m * r, 2)
         return residual, matrix
+
+    def _decided_functions(self, place: CurvePoint, found: Multipliers) -> TestFunctions:
+        """Return the functions where one multiplier is 1 and the others are pairs with the product 1.
+
+        The fold is that of the kept quantity.
+        """
+        values, nothing = found.values, float("nan")
+        others = np.delete(np.arange(len(values)), np.argmin(np.abs(values - 1.0)))
+        first = place.tangent[: self.flow.dim]
+        fold = float(self.slope(place.u) @ first) * np.sqrt(self.pieces)
+        plus, minus = (product_less(found.log[others], found.phases[others], unit) for unit in (1.0, -1.0))
+        collision = discriminant(values[others])
+        return TestFunctions(fold, plus, minus, nothing, np.zeros(0), values, collision)
+
+    def kind_at(self, name: str, here: TestFunctions) -> str:
+        """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""
+        if name == "unit_multiplier":
+            return "branch point"
+        if name == "collision":
+            # On the real axis: unstable before and after.
+            turns = 1e-6 < abs(np.angle(here.pair)) < np.pi - 1e-6 and abs(abs(here.pair) - 1.0) <= 1e-3
+            return "Krein collision" if turns else ""
+        return super().kind_at(name, here)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
 from udd import _core
 
+from .bifurcation_functions import STILL, TURNING, TestFunctions
 from .flow_map import Floats, FlowMap
+from .pseudo_arclength import CurvePoint
 
 __all__ = ["EquilibriumCurve", "expansion"]
 
@@ -101,3 +104,48 @@ class EquilibriumCurve:
         by_state = here.by_state * self._rates[:, None] * self.flow.size
         by_value = here.by_parameter[self.parameter] * self._rates * self.scale
         return here.rate * self._rates, np.column_stack([by_state, by_value])
+
+    kind = "equilibrium"
+
+    def first_state(self, u: Floats) -> Floats:
+        """Return the equilibrium as a state (dim,) of the model."""
+        return self.flow.full(self.state(u))
+
+    def period(self, u: Floats) -> float:
+        """Return NaN: equilibria have no period."""
+        return float("nan")
+
+    def mirrors_itself(self, u: Floats) -> bool:
+        """Return True if the equilibrium is its own mirror image."""
+        mirror, x = self.flow.mirror, self.state(u)
+        return mirror is not None and bool(np.allclose(mirror * x, x, atol=1e-12))
+
+    def ordered(self, values: np.ndarray) -> np.ndarray:
+        """Return eigenvalues with the largest real part first."""
+        return values[np.argsort(-values.real, kind="stable")]
+
+    def stable(self, values: np.ndarray) -> np.ndarray:
+        """Return True for each row of eigenvalues (n, r) that all have negative real parts."""
+        return np.asarray(np.all(values.real < 0, axis=1))
+
+    def test_functions(self, place: CurvePoint) -> TestFunctions:
+        """Return the test functions at a point."""
+        here = self.at(place.u)
+        values = np.linalg.eigvals(here.by_state).astype(complex)
+        pairs = [a + b for a, b in combinations(values * self.flow.clock, 2)]
+        complex_pair, nothing = float(np.prod(pairs).real) if pairs else float("nan"), float("nan")
+        determinant = float(np.linalg.det(here.by_state * self.flow.clock))
+        fold = float(place.tangent[-1])
+        return TestFunctions(fold, determinant, nothing, complex_pair, here.surfaces, values)
+
+    def kind_at(self, name: str, here: TestFunctions) -> str:
+        """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""
+        if name == "complex_pair":
+            pair = here.pair  # two real ones make a neutral saddle
+            turns = abs(pair.imag) * self.flow.clock > TURNING
+            return "Hopf" if turns and abs(pair.real) < 1e-6 * abs(pair.imag) else ""
+        return "fold" if name == "fold" or abs(here.fold) <= STILL else "branch point"
+
+    def frequency(self, u: Floats, here: TestFunctions) -> float:
+        """Return the frequency of the pair that bifurcates there, per unit of time."""
+        return here.pair.imag

@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 
 from udd import _core
 
-from .equilibrium_curve import expansion
 from .flow_map import Floats
 
 if TYPE_CHECKING:
     from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["Multipliers", "as_liouville", "multipliers_at"]
+__all__ = ["Multipliers", "multipliers_at"]
 
 _ROUGH = 1e-12  # relative error of a piece's derivatives: runs to the tolerance 1e-13, and rounding
 _KNOWN = 0.1  # a multiplier with a larger relative error has no sign of its own
 _WEAK = 0.5  # ... which does not matter where it is this far inside the unit circle
-_APART = 1e-2  # between the logarithms of the product of all multipliers and of Liouville's formula
 
 
 @dataclass(frozen=True)
@@ -70,25 +68,3 @@ def multipliers_at(curve: PeriodicOrbitCurve, u: Floats) -> Multipliers:
         lost = np.full(factors.shape[1], np.nan)
         return Multipliers(lost, lost.astype(complex), np.full(factors.shape[1], np.inf))
     return Multipliers(found["log"], found["re"] + 1j * found["im"], _ROUGH * found["condition"])
-
-
-def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:
-    """Whether the product of the multipliers is the exponential of the divergence along the orbit.
-
-    Not asked where the law has kinks, across which volumes may jump.
-    """
-    from .orbit_geometry import orbit_states
-
-    flow, values, found = curve.flow, curve.values_at(u), multipliers_at(curve, u)
-    if len(expansion(flow, values, curve.nodes(u)[0]).surfaces):
-        return True
-    states = flow.reduced(orbit_states(curve, u))
-    # The mean over equal distances of time around a period converges faster than any power of their number.
-    times = np.arange(len(states)) * (curve.period(u) / len(states))
-    if flow.forcing is None:
-        times = np.zeros(len(states))
-    each = zip(states, times.tolist(), strict=True)
-    divergence = np.mean([np.trace(expansion(flow, values, x, t=t).by_state) for x, t in each])
-    known = float(divergence) * curve.span(u)
-    rough = _APART * max(1.0, abs(known)) + float(np.minimum(found.error, 1e3).sum())
-    return bool(abs(float(found.log.sum()) - known) < rough)

@@ -13,16 +13,18 @@ from udd.errors import IncompleteWarning, ModelError
 from udd.simulation.batch import Batch
 from udd.simulation.trajectory import simulate
 
-from .equilibrium_curve import EquilibriumCurve
+from .equilibrium_curve import EquilibriumCurve, expansion
+from .floquet_multipliers import multipliers_at
 from .flow_map import Floats
 from .shooting_curve import PeriodicOrbitCurve
 
 if TYPE_CHECKING:
     from .branch import Branch
 
-__all__ = ["crossings_of", "extremes_of", "orbit_states"]
+__all__ = ["as_liouville", "crossings_of", "extremes_of", "orbit_states"]
 
 _BETWEEN = 12  # states in a piece
+_LIOUVILLE = 1e-2  # between the logarithms of the product of all multipliers and of Liouville's formula
 
 
 def orbit_states(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
@@ -105,3 +107,23 @@ def crossings_of(
         states += [*own]
     dim = len(branch.model.state_names)
     return np.array(which, dtype=np.intp), np.array(states).reshape(-1, dim)
+
+
+def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:
+    """Return True if the product of the multipliers is the exponential of the divergence along the orbit.
+
+    Not asked where the law has kinks, across which volumes may jump.
+    """
+    flow, values, found = curve.flow, curve.values_at(u), multipliers_at(curve, u)
+    if len(expansion(flow, values, curve.nodes(u)[0]).surfaces):
+        return True
+    states = flow.reduced(orbit_states(curve, u))
+    # The mean over equal distances of time around a period converges faster than any power of their number.
+    times = np.arange(len(states)) * (curve.period(u) / len(states))
+    if flow.forcing is None:
+        times = np.zeros(len(states))
+    each = zip(states, times.tolist(), strict=True)
+    divergence = np.mean([np.trace(expansion(flow, values, x, t=t).by_state) for x, t in each])
+    known = float(divergence) * curve.span(u)
+    rough = _LIOUVILLE * max(1.0, abs(known)) + float(np.minimum(found.error, 1e3).sum())
+    return bool(abs(float(found.log.sum()) - known) < rough)

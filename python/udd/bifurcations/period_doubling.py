@@ -6,11 +6,11 @@ import numpy as np
 
 from udd.errors import IntegrationError
 
-from .bifurcation_functions import TestFunctions, test_functions_at
+from .bifurcation_functions import TestFunctions
 from .bifurcation_location import location_error, point_at
-from .branch import AnyCurve, BifurcationPoint, Branch
+from .branch import BifurcationPoint, Branch
 from .branch_continuation import branch_from
-from .branch_following import BranchTrace
+from .branch_following import BranchTrace, Station
 from .branch_solutions import solution_at
 from .branch_switching import doubled
 from .flow_map import Floats
@@ -66,7 +66,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
             place = CurvePoint(u, tangent_at(new, u, row))
         except IntegrationError as error:
             raise CorrectorFailed(str(error)) from None
-        found[square] = place, test_functions_at(new, place)
+        found[square] = place, new.test_functions(place)
         return u
 
     square = amplitude**2
@@ -101,8 +101,6 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     )
     own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
     # Orbits beyond the doubling, from the secant method, are left out.
-    places: list[tuple[AnyCurve, CurvePoint, TestFunctions, float]] = [
-        (new, *found[s], s**0.5) for s in sorted(found) if s <= square
-    ]
+    places = [Station(new, *found[s], s**0.5) for s in sorted(found) if s <= square]
     way = BranchTrace(places, [own], "the point that was wanted")
     return branch_from([way], point.solution.model, point.parameter, f"born at a {_KIND}")

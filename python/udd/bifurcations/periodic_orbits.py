@@ -171,10 +171,7 @@ def pieces_for(flow: FlowMap, span: float) -> int:
 def cycle_at(curve: PeriodicOrbitCurve, u: Floats) -> PeriodicOrbit:
     """The cycle that solves a curve's equations."""
     flow, values = curve.flow, curve.values_at(u)
-    multipliers = multipliers_at(curve, u).values
-    if curve.symmetric:
-        multipliers = multipliers**2 + 0.0
-    multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
+    multipliers = curve.ordered(multipliers_at(curve, u).values)
     residual, _ = curve.equations(u)
     nodes = flow.full(curve.nodes(u))
     model = flow.with_values(values)

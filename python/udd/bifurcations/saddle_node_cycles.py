@@ -7,7 +7,6 @@ from scipy import optimize
 
 from udd.errors import IntegrationError
 
-from .bifurcation_functions import test_functions_at
 from .bifurcation_location import bifurcations_between, location_error, point_at
 from .branch import BifurcationPoint, Branch
 from .branch_solutions import solution_at
@@ -69,7 +68,7 @@ def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
         here = CurvePoint(start, tangent_at(rests, start, along))
         end = newton_corrector(rests, here.u + 2.0 * _BESIDE * here.tangent, here.tangent)
         there = CurvePoint(end, tangent_at(rests, end, here.tangent))
-        signs, step = (test_functions_at(rests, here), test_functions_at(rests, there)), 2.0 * _BESIDE
+        signs, step = (rests.test_functions(here), rests.test_functions(there)), 2.0 * _BESIDE
         for kind, sigma, place, at in bifurcations_between(rests, here, step, *signs):
             if kind == "fold":
                 errors = location_error(rests, here, sigma, place, step, "fold")

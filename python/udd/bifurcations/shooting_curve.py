@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
+from .bifurcation_functions import STILL, TURNING, TestFunctions, product_less
 from .condensation import CyclicEquations
+from .floquet_multipliers import Multipliers, multipliers_at
 from .flow_map import Floats, FlowMap, SegmentEnds
-from .pseudo_arclength import _DENSE
+from .pseudo_arclength import _DENSE, CurvePoint
 
 __all__ = ["HELD", "PeriodicOrbitCurve"]
 
@@ -233,3 +236,54 @@ class PeriodicOrbitCurve:
         before = np.roll(after, 1, axis=0)
         factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before
         return np.ascontiguousarray(factors)
+
+    kind = "cycle"
+
+    def first_state(self, u: Floats) -> Floats:
+        """Return the first node as a state (dim,) of the model."""
+        return self.flow.full(self.nodes(u)[0])
+
+    def mirrors_itself(self, u: Floats) -> bool:
+        """Return True if the cycle is its own mirror image."""
+        return self.symmetric
+
+    def ordered(self, values: np.ndarray) -> np.ndarray:
+        """Return the multipliers over the period, largest first, from those of the closing map."""
+        around = values**2 + 0.0 if self.symmetric else values
+        return around[np.argsort(-np.abs(around), kind="stable")]
+
+    def stable(self, values: np.ndarray) -> np.ndarray:
+        """Return True for each row of multipliers (n, r) that all lie inside the unit circle."""
+        return np.asarray(np.all(np.abs(values) < 1, axis=1))
+
+    def test_functions(self, place: CurvePoint) -> TestFunctions:
+        """Return the test functions at a point, from the runs that the point was corrected with."""
+        found = multipliers_at(self, place.u)
+        if not found.decided:
+            nothing = float("nan")
+            fold = float(place.tangent[-1])
+            return TestFunctions(fold, nothing, nothing, nothing, np.zeros(0), found.values)
+        return self._decided_functions(place, found)
+
+    def _decided_functions(self, place: CurvePoint, found: Multipliers) -> TestFunctions:
+        pairs = list(combinations(range(len(found.values)), 2))
+        one, other = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+        logs, phases = found.log[one] + found.log[other], found.phases[one] * found.phases[other]
+        complex_pair = product_less(logs, phases, 1.0) if pairs else float("nan")
+        plus, minus = (product_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
+        return TestFunctions(float(place.tangent[-1]), plus, minus, complex_pair, np.zeros(0), found.values)
+
+    def kind_at(self, name: str, here: TestFunctions) -> str:
+        """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""
+        if name == "complex_pair":
+            pair = here.pair
+            turns = abs(np.angle(pair)) > TURNING and abs(abs(pair) - 1.0) < 1e-5
+            return "Neimark-Sacker" if turns else ""
+        if name == "period_doubling":
+            return "symmetry breaking" if self.symmetric else "period doubling"
+        # Towards a connection the parameter hardly moves, and whether it turns is lost in rounding.
+        return "fold" if name == "fold" or abs(here.fold) <= STILL else "branch point"
+
+    def frequency(self, u: Floats, here: TestFunctions) -> float:
+        """Return the frequency of the pair that bifurcates there, per unit of time."""
+        return float(np.angle(here.pair)) / self.span(u)

@@ -9,7 +9,7 @@ from scipy import optimize
 
 from udd.errors import IntegrationError
 
-from .bifurcation_functions import TestFunctions, test_functions_at
+from .bifurcation_functions import TestFunctions
 from .branch import AnyCurve
 from .flow_map import Floats
 from .pseudo_arclength import _ENOUGH, _MOST, _NOISE, CorrectorFailed, CurvePoint, solve
@@ -47,7 +47,7 @@ class SurfacePoint:
     @property
     def functions(self) -> TestFunctions:
         """The test functions of the curve."""
-        return test_functions_at(self.curve, self.place)
+        return self.curve.test_functions(self.place)
 
     def ahead(self, direction: Floats) -> Floats:
         """A direction (2,) in the plane as one of the unknowns."""
