@@ -18,7 +18,7 @@ pub struct Place<'a, S> {
     pub inputs: &'a [S],
 }
 
-/// What an operation does with the registers `a`, `b` and `c`.
+/// The effect of an operation on the registers `a`, `b` and `c`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Action {
     Add,
@@ -105,7 +105,7 @@ impl Program {
         self.leaves.iter().any(|leaf| matches!(leaf, Leaf::Rate(_)))
     }
 
-    /// What the parameters determine, for [`run`](Program::run).
+    /// Computes the values that depend on parameters alone, for [`run`](Program::run).
     ///
     /// # Panics
     /// If there are fewer parameters than the formulas take.
@@ -254,7 +254,7 @@ struct Made {
     fixed: bool,
 }
 
-/// What two values that are made alike share: the operation's name, its numbers, and what it is made of.
+/// The key of equal values: the operation's name, its numbers and its operands.
 type Likeness = (&'static str, [u64; 6], [usize; 3]);
 
 /// All values of some formulas, equal ones merged. A value comes after those that it is made of.
@@ -458,7 +458,7 @@ impl<'a> Registers<'a> {
     }
 
     fn program(mut self, [first, rest]: [Vec<(usize, Action, [usize; 3])>; 2], results: &[usize]) -> Program {
-        // When each value is read for the last time. What the parameters determine stays: the steps can be done again.
+        // The last use of each value. Values of parameters alone stay, so that the steps can be repeated.
         let mut last = vec![None; self.graph.made.len()];
         let mut fixed: Vec<usize> = Vec::new();
         let mut reads = |i: usize| {
@@ -553,7 +553,7 @@ mod tests {
         assert_eq!((both.steps.len(), both.first.len()), (3, 2));
         let sine = 2.0_f64.sin();
         assert_eq!(values(&both, [5.0, 3.0]), [sine * 25.0, 3.0 / 5.0 + -3.0 * sine, sine]);
-        // Of parameters alone, of a leaf, of rates and time.
+        // Formulas of parameters alone, a leaf, rates and time.
         assert_eq!(values(&program(&["a*b - 1", "y", "x' + t*y'"]), [5.0, 3.0]), [14.0, -3.0, 12.5]);
     }
 

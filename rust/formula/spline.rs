@@ -11,7 +11,7 @@ pub struct Spline {
     /// Where its knots begin and how many there are per unit.
     pub low: f64,
     pub per: f64,
-    /// Whether it begins anew where it ends. Else it keeps its last value.
+    /// True if the curve is periodic. Otherwise it keeps its last value beyond its ends.
     pub periodic: bool,
 }
 
@@ -48,7 +48,7 @@ impl Spline {
         if !floor.is_single() {
             return S::constant(f64::NAN);
         }
-        // The last point belongs to the last cell. What is no number has none, and stays none.
+        // The last point belongs to the last cell. NaN has no cell and stays NaN.
         let floor = if self.periodic { floor } else { floor.min(S::Real::constant((cells - 1) as f64)) };
         let place = |lane: usize| match self.periodic {
             true => floor.lane(lane).rem_euclid(cells as f64) as usize % cells,

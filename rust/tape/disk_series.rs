@@ -54,7 +54,7 @@ pub(super) fn expand<V: InstructionSet, S: Scalar, const D: usize, const N: usiz
     }
 }
 
-/// Of a single trajectory, with everything unrolled, up to the order `TO`.
+/// The series of a single trajectory, unrolled up to the order `TO`.
 #[inline(always)]
 fn unrolled<V: InstructionSet, S: Scalar, const N: usize, const TO: usize>(
     start: &Start<S>,
@@ -151,11 +151,11 @@ impl<S: Scalar> Start<S> {
         Self { law, x, inverse: S::one() / (law.inertia + y.square() + z.square()) }
     }
 
-    /// The coefficients `k + 1` of Omega, Y, Z and beta, and the coefficient of Z's integral, from the last ones
-    /// of Omega, Y and Z and from the sums over their products with Omega and that of the integral, without the
-    /// terms that hold coefficients of order 0.
+    /// The coefficients `k + 1` of Omega, Y, Z and beta, and the coefficient of Z's integral. They follow from the
+    /// last coefficients of Omega, Y and Z, and from the sums over their products with Omega and with the integral.
+    /// The sums leave out the terms with coefficients of order 0.
     ///
-    /// A single trajectory waits for what was found last: it enters last, all at once, which leaves the sums to be
+    /// A single trajectory waits for the coefficient of the last step. It enters last, so that the sums are
     /// computed meanwhile.
     #[inline(always)]
     fn next(&self, k: usize, [omega, y, z]: [S; 3], [square, along, across, swept]: [S; 4]) -> ([S; 4], S) {
@@ -167,8 +167,8 @@ impl<S: Scalar> Start<S> {
             torque = g * y - (a + b * omega + lever) * omega;
             (lateral, vertical) = (z * omega, w - y * omega);
         } else {
-            // Of I dOmega/dT there are beside the rate looked for the sum of 2 W i Omega_i Z_m/(m + 1) over i + m = k,
-            // where i = (k + 1) - (m + 1).
+            // I dOmega/dT also contains the sum of 2 W i Omega_i Z_m/(m + 1) over i + m = k, with
+            // i = (k + 1) - (m + 1).
             let reaction = (w + w) * swept.scale((k + 1) as f64);
             let slope = a + (b + b) * omega0 + lever.scale((2 * k + 1) as f64);
             torque =

@@ -1,7 +1,7 @@
 //! Steps of a tape that follow each other, as one operation.
 //!
-//! The interpreter's time is the way from one operation to the next, through memory. What is made by one step and used
-//! by one linear step only is handed over directly: `x y - b z` is one operation instead of three. Nothing is
+//! The interpreter's time is the way from one operation to the next, through memory. A result
+//! that only one linear step uses is passed on in a register: `x y - b z` is one operation instead of three. Nothing is
 //! reordered or rounded otherwise, so no bit changes.
 
 use super::node::{INVERSE, Node, Step};
@@ -39,7 +39,7 @@ enum Then {
 /// The most linear operations after a step.
 const MOST: usize = 3;
 
-/// What a chain of linear operations begins with.
+/// The first value of a chain of linear operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum First {
     /// `a`
@@ -70,7 +70,7 @@ struct Stretch {
     last: Option<Step>,
 }
 
-/// What a tape does for each order.
+/// The operations of a tape for each order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Program {
     stretches: Vec<Stretch>,
@@ -192,7 +192,7 @@ impl Fusing {
         Some(Chain { to, ..chain })
     }
 
-    /// Of two operands the one to go on with, and the other.
+    /// The operand to continue the chain with, and the other operand.
     fn pair(&mut self, a: u16, b: u16) -> (u16, Operand) {
         let waits =
             |slot: u16| self.waiting[usize::from(slot)].is_some_and(|chain| usize::from(chain.count) < MOST);
@@ -211,7 +211,7 @@ impl Fusing {
         (first, Operand::Series(other))
     }
 
-    /// The series and the factor of what waits and is nothing but their product.
+    /// The series and the factor of a waiting value that is their product.
     fn scaled(&self, slot: u16) -> Option<(u16, u16)> {
         match self.waiting[usize::from(slot)] {
             Some(Chain { first: First::Series, a, count: 1, then: [Then::Scale(h), ..], .. }) => Some((a, h)),
@@ -303,7 +303,7 @@ impl Chain {
         }
     }
 
-    /// The linear operations; what is held has only a coefficient of order 0.
+    /// The linear operations; a constant has only a coefficient of order 0.
     #[inline(always)]
     fn rest<S: Scalar, const N: usize>(&self, mut c: S, work: &[[S; N]], held: &[S], k: usize) -> S {
         macro_rules! of {

@@ -58,7 +58,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         }
     }
 
-    /// Takes these pieces of the inputs until they are set anew.
+    /// Uses these pieces of the inputs until the next call.
     #[inline(never)]
     pub fn set_inputs(&mut self, tape: &Tape<D>, piece: &dyn Fn(usize) -> Piece<S>) {
         for (i, held) in tape.held.iter().enumerate() {
@@ -148,14 +148,14 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         flat
     }
 
-    /// The coefficients of each component, order 0 first; those beyond the [`order`](Jets::order) are idle.
+    /// The coefficients of each component, order 0 first. Coefficients above the [`order`](Jets::order) mean nothing.
     #[inline(always)]
     pub fn coefficients(&self) -> &[[S; N]; D] {
         self.work.first_chunk().expect("a slot for each component")
     }
 }
 
-/// What is compiled once for each instruction set.
+/// The work that is compiled once for each instruction set.
 struct Expansion<'a, S: Scalar, const D: usize, const N: usize> {
     jets: &'a mut Jets<S, D, N>,
     tape: &'a Tape<D>,

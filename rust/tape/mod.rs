@@ -38,9 +38,9 @@ use crate::scalar::Scalar;
 pub struct Tape<const D: usize> {
     /// Values that do not change along a solution, each made of earlier ones.
     pub(crate) held: Vec<Invariant>,
-    /// What changes along a solution; a step uses the results of earlier ones.
+    /// The values that change along a solution; a step uses the results of earlier steps.
     pub(crate) steps: Vec<Step>,
-    /// Where the rates are found.
+    /// The slots of the rates.
     pub(crate) rates: [u16; D],
     /// How many series there are; the first `D` are the state.
     pub(crate) slots: usize,
@@ -53,7 +53,7 @@ pub struct Tape<const D: usize> {
 }
 
 impl<const D: usize> Tape<D> {
-    /// What changes along a solution, in the order of evaluation.
+    /// The values that change along a solution, in the order of evaluation.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
@@ -95,7 +95,7 @@ impl<const D: usize> Tape<D> {
         !self.is_unrolled() && failure.is_of_series()
     }
 
-    /// What does not change along a solution, in the order of evaluation.
+    /// The values that do not change along a solution, in the order of evaluation.
     pub fn held(&self) -> &[Invariant] {
         &self.held
     }

@@ -156,7 +156,7 @@ impl Step {
                 held[usize::from($i)]
             };
         }
-        // What is short stays in registers where the long functions are apart.
+        // Short operations stay in registers if the long functions are separate.
         to[0][0] = match self.node {
             Node::Time => t,
             Node::Hold(c) => h!(c),

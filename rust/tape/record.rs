@@ -18,13 +18,13 @@ use crate::scalar::Scalar;
 pub struct Unrecordable;
 
 impl<const D: usize> Tape<D> {
-    /// Records the rates of the family's systems. Parameters whose value is `fixed` become constants,
-    /// and what they make vanish is left out; from a series that is written out only where that is written, too.
+    /// Records the rates of the family's systems. Parameters whose value is `fixed` become constants, and terms that
+    /// vanish with them are left out, but not from a compiled series unless it has a variant without them.
     ///
-    /// What is fixed does not change a bit of the series, so that a run's bits do not depend on the runs beside it.
+    /// Fixed parameters do not change a bit of the series: a run's bits do not depend on other runs.
     ///
     /// # Errors
-    /// Where the model looks at the value of a number, which a recording does not have.
+    /// The model looks at the value of a number, which a recording does not have.
     pub fn record<F: Family<D>>(family: &F, fixed: &[Option<f64>]) -> Result<Self, Unrecordable> {
         let open = Self::recorded(family, &[])?;
         if fixed.iter().all(Option::is_none) {
@@ -65,7 +65,7 @@ struct Lowering<'a> {
     held: Vec<Invariant>,
     steps: Vec<Step>,
     slots: usize,
-    /// Where each symbol's value is held, or its series stored.
+    /// The place of each constant, and the slot of each series.
     held_at: HashMap<Symbol, u16>,
     slot_of: HashMap<Symbol, u16>,
     circle_of: HashMap<Symbol, u16>,
@@ -118,7 +118,7 @@ impl<'a> Lowering<'a> {
         self.recording.made[s.0 as usize]
     }
 
-    /// Where the value of a symbol that does not vary is held.
+    /// The place of a constant symbol's value.
     fn held(&mut self, s: Symbol) -> u16 {
         if let Some(&at) = self.held_at.get(&s) {
             return at;
@@ -141,7 +141,7 @@ impl<'a> Lowering<'a> {
         at
     }
 
-    /// Where an input's origin is held, and its coefficients behind it.
+    /// The place of an input's origin; its coefficients follow.
     fn input(&mut self, k: usize) -> u16 {
         let at = index(self.held.len());
         let parts = 0..=index(crate::model::PIECE_COEFFICIENTS);

@@ -24,7 +24,7 @@ macro_rules! orders {
 }
 pub(super) use orders;
 
-/// What the coefficients of a series are: any scalar, or a fan.
+/// The coefficients of a series: any scalar, or a fan.
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> + AddAssign
 {

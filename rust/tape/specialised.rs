@@ -27,7 +27,7 @@ impl Specialised {
     }
 }
 
-/// Where a tape holds the values of these steps, if they are its own but for the numbers of what is held.
+/// The places of a tape's constants if its steps are these, apart from the numbers of the constants.
 fn held_as_in<const D: usize>(tape: &Tape<D>, steps: &[Step], rates: &[u16]) -> Option<Held> {
     if tape.rates != *rates || tape.steps.len() != steps.len() {
         return None;

@@ -182,7 +182,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
         let Self(jets, dt, parts, of) = self;
         let mut states = [[S::Real::zero(); D]; P];
         if const { S::Real::LANES == 1 && !V::ISA.is_rare() } {
-            // One trajectory: the places side by side, as vector instructions want it.
+            // One trajectory: the places are the lanes of a packet, for vector instructions.
             let part = |i: usize| parts.get(i).copied().unwrap_or_default();
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {

@@ -6,7 +6,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, elementary};
 
-/// What is known of a number while its model is recorded: how it was made, not its value.
+/// A number while its model is recorded: its operation is known, its value is not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Symbol(pub(super) u32);
 
@@ -97,7 +97,7 @@ pub(super) struct Recording {
     pub(super) made: Vec<Made>,
     /// Whether it changes along a solution.
     pub(super) varies: Vec<bool>,
-    /// By how it was made, whatever was made before it.
+    /// Its place in the order of operands, independent of earlier symbols.
     ranks: Vec<Rank>,
     known: HashMap<Made, Symbol>,
     /// The model looked at a value, which a recording does not have.
@@ -126,8 +126,8 @@ fn looked() {
     RECORDING.with_borrow_mut(|r| r.looked = true);
 }
 
-/// What the operands of sums and products are ordered by: the components of the state come first, then what is made of
-/// most operations.
+/// The order of operands in sums and products: the components of the state come first, then the values with the most
+/// operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Rank {
     kind: u64,
@@ -215,7 +215,7 @@ impl Recording {
     }
 
     fn constant(&mut self, value: f64) -> Symbol {
-        // One zero: its sign tells nothing in a model.
+        // One zero: its sign means nothing in a model.
         self.make(Made::Constant((value + 0.0).to_bits()))
     }
 
@@ -297,7 +297,7 @@ impl Recording {
         }
     }
 
-    /// What does not vary is pulled out of products: the same product is found more often, and it
+    /// Constant factors are pulled out of products: equal products are merged more often, and the factor
     /// multiplies once per order.
     fn mul(&mut self, a: Symbol, b: Symbol) -> Symbol {
         match (self.value(a), self.value(b)) {
@@ -483,8 +483,8 @@ impl Scalar for Symbol {
     }
 }
 
-/// A symbol stands for a number without derivatives, but has no value to look at: a model that does
-/// cannot be recorded, and [`Tape::record`](super::Tape::record) says so.
+/// A symbol is a number without derivatives and without a value. A model that looks at the value cannot be recorded;
+/// [`Tape::record`](super::Tape::record) says so.
 impl Real for Symbol {
     const LANES: usize = 1;
     fn work<W: Work>(_isa: Isa, work: W) -> W::Output {
