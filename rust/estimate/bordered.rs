@@ -4,7 +4,7 @@ use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 
 use super::row_matrix::{OuterProductSum, RowMatrix, add, combine, dot, padded};
 use super::{EstimateError, Linearisation, ParameterJacobian, Record};
-use crate::analysis::batch::cancel;
+use crate::integrate::cancel;
 use crate::scalar::{InstructionSet, Isa, Real, Work};
 use crate::unroll::vector;
 

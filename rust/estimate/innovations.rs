@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bordered::root;
 use super::{EstimateError, Estimator, Sensor, Unknowns};
-use crate::analysis::batch::cancel;
+use crate::integrate::cancel;
 use crate::inverse::invert;
 use crate::model::Family;
 

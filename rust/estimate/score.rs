@@ -9,8 +9,8 @@ use super::link_response::QuadraturePoints;
 use super::parameter_jacobian::{ParameterJacobian, TimeOrigin};
 use super::row_matrix::RowMatrix;
 use super::{EstimateError, Estimator, FreeParameter, Linearisation, Role, Sensor, Unknowns};
-use crate::analysis::batch::cancel;
 use crate::analysis::batch::parallel::try_map;
+use crate::integrate::cancel;
 use crate::model::Family;
 
 /// The candidates' amplitudes near zero, everything else optimal: the cost falls by

@@ -5,8 +5,8 @@ use nalgebra::SMatrix;
 use super::sensor::{Moment, seen};
 use super::{EstimateError, Estimator, FilmParameters, Options, Sensor, Unknowns};
 use crate::analysis::CancelFlag;
-use crate::analysis::batch::cancel;
 use crate::analysis::batch::parallel::try_map;
+use crate::integrate::cancel;
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
 

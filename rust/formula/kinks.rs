@@ -1,5 +1,7 @@
 //! Where formulas have kinks: the surfaces that runs land on.
 
+use std::ops::Range;
+
 use super::{Binary, Expression, Leaf, Op, Unary};
 use crate::model::MAX_SURFACES;
 use crate::scalar::Scalar;
@@ -36,7 +38,7 @@ impl Kink {
         }
     }
 
-    /// What it is called in a formula's text.
+    /// Its name in a formula's text.
     pub fn name(self) -> &'static str {
         match self {
             Kink::Abs => "abs",
@@ -88,10 +90,14 @@ impl Kinks {
     pub fn of(&mut self, formula: &mut Expression) {
         // Where each number on the stack begins.
         let mut starts: Vec<usize> = Vec::new();
-        for i in 0..formula.ops.len() {
+        let mut next = 0;
+        while next < formula.ops.len() {
+            let mut i = next;
             let op = formula.ops[i];
             let at = starts.len() - op.takes();
-            if let Some(kink) = Kink::of(op) {
+            if op == Op::Unary(Unary::Sign) && !Expression::varies_of(&formula.ops[starts[at]..i]) {
+                i = self.constant_sign(formula, starts[at]..i);
+            } else if let Some(kink) = Kink::of(op) {
                 let own = match kink {
                     Kink::Abs | Kink::Sign => formula.ops[starts[at]..i].to_vec(),
                     Kink::Min | Kink::Max => {
@@ -107,7 +113,28 @@ impl Kinks {
             let start = starts.get(at).copied().unwrap_or(i);
             starts.truncate(at);
             starts.push(start);
+            next = i + 1;
         }
+    }
+
+    /// Writes the sign of a constant, which may be zero, on the sides of two surfaces. Returns the place of its last
+    /// operation. It stays a comparison if there is no room for both.
+    fn constant_sign(&mut self, formula: &mut Expression, of: Range<usize>) -> usize {
+        let above = formula.ops[of.clone()].to_vec();
+        let below = [&above[..], &[Op::Unary(Unary::Neg)]].concat();
+        let known = |ops: &[Op]| self.surfaces.iter().any(|known| known.ops == ops);
+        let needed = usize::from(!known(&above)) + usize::from(!known(&below));
+        if self.surfaces.len() + needed + usize::from(self.clocked) > MAX_SURFACES {
+            return of.end;
+        }
+        let (Some(above), Some(below)) = (self.surface(above), self.surface(below)) else { return of.end };
+        (self.jumps[above], self.jumps[below]) = (true, true);
+        let number = |value: f64| Op::Push(Leaf::Number(value));
+        let on = |side: usize| Op::On(Kink::Where, side as u8);
+        // The side is the condition: any number fills its place on the stack.
+        let sign = [number(0.0), number(1.0), number(0.0), number(-1.0), number(0.0), on(below), on(above)];
+        formula.ops.splice(of.start..=of.end, sign);
+        of.start + sign.len() - 1
     }
 
     /// Finds the surfaces that the law with these rates may slide on.

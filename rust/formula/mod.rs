@@ -42,12 +42,12 @@ pub struct Names<'a> {
     pub rates: bool,
 }
 
-/// What is wrong with a formula.
+/// The fault of a formula.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{0}")]
 pub struct Mistake(pub String);
 
-/// What a formula takes from where it is evaluated.
+/// A value that a formula takes from its place of evaluation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leaf {
     Number(f64),
@@ -65,7 +65,7 @@ pub enum Leaf {
 pub enum Unary {
     Neg,
     Abs,
-    /// 1 above zero, -1 below.
+    /// 1 above zero, -1 below, 0 at zero.
     Sign,
     Sqrt,
     Exp,
@@ -113,7 +113,7 @@ pub enum Op {
 }
 
 impl Op {
-    /// How many numbers it takes from the stack; it leaves one.
+    /// The number of values that it takes from the stack; it leaves one.
     pub fn takes(self) -> usize {
         match self {
             Op::Push(_) => 0,
@@ -124,7 +124,7 @@ impl Op {
         }
     }
 
-    /// What it is called in a formula's text; where it stands for what is pushed, what that is.
+    /// Its name in a formula's text; for a value that is pushed, the kind of the value.
     pub fn name(self) -> &'static str {
         match self {
             Op::Push(Leaf::Number(_)) => "number",
@@ -174,7 +174,15 @@ impl Expression {
     /// # Errors
     /// What is wrong, in words that continue "the formula ...".
     pub fn parse(text: &str, names: Names<'_>) -> Result<Self, Mistake> {
-        Ok(Self::of(parse::parse(text, names)?))
+        Ok(Self::of(parse::parse(text, names, false)?))
+    }
+
+    /// Parses a formula for single places: `a >= b` is true if `a` equals `b`, even for a state.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub(crate) fn parse_exact(text: &str, names: Names<'_>) -> Result<Self, Mistake> {
+        Ok(Self::of(parse::parse(text, names, true)?))
     }
 
     /// A number.
@@ -186,7 +194,7 @@ impl Expression {
         Self { ops }
     }
 
-    /// Puts one operation in the place of these wherever they stand, one that pushes as much.
+    /// Replaces these operations everywhere by `new`, which pushes as many numbers.
     pub(crate) fn replace(&mut self, old: &[Op], new: Op) {
         let mut at = 0;
         while at + old.len() <= self.ops.len() {
@@ -202,15 +210,19 @@ impl Expression {
         &self.ops
     }
 
-    /// Whether it needs the rates.
+    /// Returns true if it needs the rates.
     pub fn has_rates(&self) -> bool {
         self.ops.iter().any(|op| matches!(op, Op::Push(Leaf::Rate(_))))
     }
 
-    /// Whether it changes in time, by the state or by itself.
+    /// Returns true if it changes in time, through the state or directly.
     pub fn varies(&self) -> bool {
-        self.ops
-            .iter()
+        Self::varies_of(&self.ops)
+    }
+
+    /// The same of a part of an expression.
+    fn varies_of(ops: &[Op]) -> bool {
+        ops.iter()
             .any(|op| matches!(op, Op::Push(Leaf::Rate(_) | Leaf::State(_) | Leaf::Time | Leaf::Input(_))))
     }
 

@@ -36,8 +36,8 @@ fn mistake<T>(what: impl Into<String>) -> Result<T, Mistake> {
     Err(Mistake(what.into()))
 }
 
-/// The operations of a formula.
-pub(super) fn parse(text: &str, names: Names<'_>) -> Parsed {
+/// The operations of a formula. If `exact`, states that are compared by `>=` or `<=` may be equal.
+pub(super) fn parse(text: &str, names: Names<'_>, exact: bool) -> Parsed {
     let length = text.chars().count();
     if length > LONGEST {
         return mistake(format!("is longer than {LONGEST} characters, {length}"));
@@ -46,11 +46,11 @@ pub(super) fn parse(text: &str, names: Names<'_>) -> Parsed {
     if tokens.is_empty() {
         return mistake("is empty");
     }
-    let mut parser = Parser { tokens: &tokens, at: 0, depth: 0, names };
+    let mut parser = Parser { tokens: &tokens, at: 0, depth: 0, names, exact };
     let mut ops = parser.sum()?;
     if parser.takes("=") {
         let right = parser.sum()?;
-        // What is zero already needs no difference.
+        // A right side of zero needs no difference.
         if number(&right) != Some(0.0) {
             ops = binary(Binary::Sub, ops, right);
         }
@@ -133,6 +133,7 @@ struct Parser<'a> {
     at: usize,
     depth: usize,
     names: Names<'a>,
+    exact: bool,
 }
 
 impl Parser<'_> {
@@ -227,7 +228,7 @@ impl Parser<'_> {
         if self.takes(")") { Ok(()) } else { mistake("lacks a closing bracket") }
     }
 
-    /// What follows the name of a function of two numbers: `(y, x)`.
+    /// Parses the arguments of a function of two numbers: `(y, x)`.
     fn pair(&mut self, name: &str, function: Binary) -> Parsed {
         let usage = || mistake(format!("needs two numbers after {name}, as in {name}(y, x)"));
         if !self.takes("(") {
@@ -242,7 +243,7 @@ impl Parser<'_> {
         Ok(binary(function, left, right))
     }
 
-    /// What follows the name of the choice: `(x > 0, a, b)`.
+    /// Parses the arguments of the choice: `(x > 0, a, b)`.
     fn choice(&mut self) -> Parsed {
         let usage = || {
             mistake(format!("needs a comparison and two numbers after {WHERE}, as in {WHERE}(x > 0, a, b)"))
@@ -251,27 +252,40 @@ impl Parser<'_> {
             return usage();
         }
         let left = self.sum()?;
-        let above = match () {
-            () if self.takes(">") || self.takes(">=") => true,
-            () if self.takes("<") || self.takes("<=") => false,
+        let (above, equal) = match () {
+            () if self.takes(">=") => (true, true),
+            () if self.takes(">") => (true, false),
+            () if self.takes("<=") => (false, true),
+            () if self.takes("<") => (false, false),
             () => return usage(),
         };
         let right = self.sum()?;
-        let (high, low) = if above { (left, right) } else { (right, left) };
-        // What is compared with zero needs no difference.
+        // Parameters and inputs can stay equal; a state is equal to something for a moment only.
+        let lasts = |ops: &[Op]| {
+            !ops.iter().any(|op| matches!(op, Op::Push(Leaf::State(_) | Leaf::Rate(_) | Leaf::Time)))
+        };
+        // Then a >= b is the opposite of b > a.
+        let opposite = equal && (self.exact || lasts(&left) && lasts(&right));
+        let (high, low) = if above != opposite { (left, right) } else { (right, left) };
+        // A comparison with zero needs no difference.
         let mut ops = if number(&low) == Some(0.0) { high } else { binary(Binary::Sub, high, low) };
-        for _ in 0..2 {
+        let mut choices = [Vec::new(), Vec::new()];
+        for choice in &mut choices {
             if !self.takes(",") {
                 return usage();
             }
-            ops.extend(self.sum()?);
+            *choice = self.sum()?;
         }
         self.close()?;
+        if opposite {
+            choices.reverse();
+        }
+        ops.extend(choices.concat());
         ops.push(Op::Where);
         Ok(ops)
     }
 
-    /// What follows the name of a spline: `(x, low, high, c0, c1, ...)`.
+    /// Parses the arguments of a spline: `(x, low, high, c0, c1, ...)`.
     fn spline(&mut self, name: &str) -> Parsed {
         let usage = || {
             mistake(format!(
@@ -358,7 +372,7 @@ pub(super) const WHERE: &str = "where";
 /// The functions that are given by coefficients.
 pub(super) const SPLINES: [&str; 2] = ["spline", "periodic"];
 
-/// What a formula may use.
+/// Lists the names that a formula may use.
 fn allowed(names: Names<'_>) -> String {
     let states = names.states.join(", ");
     let rates = match names.rates {
@@ -387,7 +401,7 @@ fn number(ops: &[Op]) -> Option<f64> {
     }
 }
 
-/// What is known already is computed at once.
+/// Computes functions of constants at once.
 fn unary(function: Unary, mut ops: Vec<Op>) -> Vec<Op> {
     if let Some(a) = number(&ops) {
         return vec![Op::Push(Leaf::Number(function.of(a)))];

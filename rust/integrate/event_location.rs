@@ -9,6 +9,7 @@
 
 use std::cell::Cell;
 
+use super::cancel;
 use super::method::{Course, MOST_PROBES, Method, StepStart};
 use super::root::bracketed;
 use super::tolerance::Tolerance;
@@ -40,6 +41,8 @@ const CLEAR_SUM: f64 = 4.0;
 const CLEAR: f64 = 1.5;
 /// A step with more pieces to look at is cut where they end.
 const MOST_PIECES: usize = 1 << 16;
+/// After each so many pieces the search asks whether its result is still wanted.
+const LOOK_EVERY: usize = 1 << 10;
 /// A step that starts on a surface does not cross it by less than its error times this: a body that is let go first moves
 /// by less than any error.
 const LIFT_OFF: f64 = 10.0;
@@ -262,7 +265,7 @@ where
             }
             let on = |dt: S::Real| self.on(target, method, dt);
             let start = self.value(target, self.at.t, &self.at.x);
-            let mut scale = start.abs();
+            let mut scale = magnitude(start);
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
             let mut values = [start; MOST_PROBES + 1];
@@ -270,7 +273,7 @@ where
                 let dt = h.scale(theta);
                 let x = vector!(S, D; n => S::lift(look.probes[i][n]));
                 let value = self.value(target, self.at.t + dt, &x);
-                scale = scale.max(value.abs());
+                scale = scale.max(magnitude(value));
                 values[i + 1] = value;
                 let new = value.less(zero).and(wrong.not());
                 high = pick(new, (dt, value), high);
@@ -330,7 +333,8 @@ where
                 crossing = crossing.and(near.not().or(gone));
             }
             let tiny = scale.scale(1e-3 * ZERO);
-            let dt = bracketed(on, low, high, tiny, crossing);
+            let limited = |(dt, value)| (dt, bounded(value));
+            let dt = bracketed(|dt| bounded(on(dt)), limited(low), limited(high), tiny, crossing);
             let first = crossing.and(dt.abs().less(earliest));
             earliest = S::Real::select(first, dt.abs(), earliest);
             found.dt = S::Real::select(first, dt, found.dt);
@@ -382,11 +386,16 @@ where
         };
         let error = || LIFT_OFF * (self.noise + self.rtol * most.get());
         let (mut located, mut doubtful) = (Located::Nowhere, None);
-        let between = |own: Bracket| {
-            let place = |(s, value): (f64, f64)| (s * size, value);
-            Located::Between(place(own.low), place(own.high))
+        let between = |Bracket { low, high }| {
+            let place = |(s, value): (f64, f64)| {
+                // From an end without a number the search begins in the middle.
+                (s * size, if value.is_nan() { -high.1 } else { value })
+            };
+            Located::Between(place(low), place(high))
         };
-        let patient = |pieces: usize| pieces <= MOST_PIECES;
+        let patient = |pieces: usize| {
+            pieces <= MOST_PIECES && !(pieces.is_multiple_of(LOOK_EVERY) && cancel::is_asked())
+        };
         let far = sign_changes(&mut curve, start, (first, last), &patient, &mut |bracket| {
             match doubtful.take() {
                 // Back from where the start led.
@@ -404,7 +413,7 @@ where
             located = between(bracket);
         }
         match located {
-            Located::Nowhere if 0.0 < far && far < 1.0 => Located::Before(far * size),
+            Located::Nowhere if far < 1.0 => Located::Before(far * size),
             located => located,
         }
     }
@@ -439,7 +448,7 @@ impl<M: System<S, D>, S: Scalar, const D: usize> Curve for TargetCurve<'_, M, S,
     fn value(&mut self, s: f64) -> f64 {
         let dt = S::Real::constant(s * self.step.1);
         let value = self.monitor.on(self.target, self.method, dt).lane(self.lane);
-        self.most.set(self.most.get().max(value.abs()));
+        self.most.set(self.most.get().max(magnitude(value)));
         value
     }
 
@@ -452,6 +461,25 @@ impl<M: System<S, D>, S: Scalar, const D: usize> Curve for TargetCurve<'_, M, S,
             self.laws.enclosed_surface(self.target, time(self.step.0, self.step.1, a, b), &x, &self.sides);
         Enclosed::select(self.sides[self.target], value, -value)
     }
+}
+
+/// The size of a value that others are compared with: an infinite value counts as 1, and what is no number as 0.
+#[inline(always)]
+fn magnitude<R: Real>(value: R) -> R {
+    let size = value.abs();
+    R::select(size.finite(), size, R::select(R::zero().less(size), R::one(), R::zero()))
+}
+
+/// The value, or 1 or -1 if it is infinite: then its sign is all that counts.
+#[inline(always)]
+fn bounded<R: Real>(value: R) -> R {
+    let sign = R::one().zip(value, f64::copysign);
+    R::select(value.abs().less(R::constant(f64::INFINITY)).or(is_nan(value)), value, sign)
+}
+
+#[inline(always)]
+fn is_nan<R: Real>(value: R) -> R::Mask {
+    R::zero().less(value.abs()).or(value.abs().less(R::one())).not()
 }
 
 #[inline(always)]
@@ -551,7 +579,7 @@ impl<R: Real> EventIteration<R> {
 
     /// Looks at the target's value after a trial of `self.size`, and chooses the next size.
     pub fn judge(&mut self, value: R) -> EventStatus<R::Mask> {
-        let zero = R::zero();
+        let (zero, value) = (R::zero(), bounded(value));
         let lanes = self.lanes();
         let size = self.size;
         let probe = self.sure.not().and(size.abs().less(self.high.0.abs()).not());

@@ -1,5 +1,6 @@
 //! The one stepping loop.
 
+use super::cancel;
 use super::event_location::{EventIteration, EventStatus, Look, SurfaceMonitor, TARGETS, WALL, union};
 use super::method::{Course, Method, StepStart, Trial};
 use super::runge_kutta::Dopri5;
@@ -500,6 +501,15 @@ impl<S: Scalar, const D: usize> Run<S, D> {
         let mut last = last;
         let cut = clear.and(found.cut.finite());
         if cut.any() {
+            if cancel::is_asked() {
+                progress.moved = never;
+                return;
+            }
+            // A step cannot be shorter than the time's rounding.
+            let next = at.t + found.cut;
+            let still = cut.and(at.t.less(next).or(next.less(at.t)).not());
+            progress.failed = progress.failed.or(still);
+            clear = clear.and(still.not());
             // The rest of the step has not been searched.
             if method.series() {
                 let x = method.at(found.cut);
@@ -760,6 +770,7 @@ where
             match self.attempt(end, &mut ending) {
                 Attempted::Moved => return Ok(ending),
                 Attempted::Failed => return Err(self.failure()),
+                Attempted::Rejected if cancel::is_asked() => return Err(Failure::Interrupted),
                 Attempted::Rejected => {}
             }
         }

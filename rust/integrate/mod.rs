@@ -4,6 +4,7 @@
 //! zeros; a [`Method`] takes steps and has their polynomials. [`Integrator`] puts them together: the one
 //! stepping loop, on which every derived object is built.
 
+pub mod cancel;
 mod dop853;
 mod event_location;
 mod integrator;
@@ -20,6 +21,7 @@ mod taylor;
 mod tolerance;
 pub mod zeros;
 
+pub use cancel::CancelFlag;
 pub use dop853::Dop853Scheme;
 pub use event_location::{Probes, TARGETS, WALL, suspect, suspect_in_turn};
 pub use integrator::{Counts, Ending, Integrator, Progress};

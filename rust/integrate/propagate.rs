@@ -1,5 +1,6 @@
 //! From one time to another, nothing kept on the way.
 
+use super::cancel;
 use super::integrator::Integrator;
 use super::tolerance::{Failure, Tolerance};
 use crate::model::{AnySystem, System};
@@ -7,6 +8,8 @@ use crate::scalar::Scalar;
 
 /// More steps than this within one propagation mean that something is wrong.
 const MOST_STEPS: u64 = 1_000_000;
+/// After each so many steps the run asks whether its result is still wanted.
+const LOOK_EVERY: u64 = 64;
 
 /// The state at `t1` of the run that starts with `x0` at `t0`; `t1` may lie before `t0`.
 ///
@@ -42,6 +45,9 @@ where
         Integrator::new(system, t0, x0, Some(t1 - t0), tolerance);
     while integrator.t() != t1 {
         integrator.advance(t1)?;
+        if integrator.counts().accepted.is_multiple_of(LOOK_EVERY) {
+            cancel::look();
+        }
         if integrator.counts().accepted > MOST_STEPS {
             return Err(Failure::TooManySteps { t: integrator.t(), limit: MOST_STEPS });
         }

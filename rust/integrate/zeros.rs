@@ -76,7 +76,7 @@ pub fn sign_changes(
         }
         open -= 1;
         let below = fb < 0.0;
-        if !fb.is_finite() {
+        if fb.is_nan() {
             known = None;
         } else if fb != 0.0 {
             if let Some((s, value, side)) = known
@@ -119,10 +119,12 @@ fn is_settled(
         }
         width = width.min(mean.width());
     }
-    if depth >= SHALLOW && depth.is_multiple_of(SHALLOW) {
-        return width <= NOISE * curve.enclose(m, m).re.width();
+    if depth < SHALLOW || !depth.is_multiple_of(SHALLOW) {
+        return false;
     }
-    false
+    let mut at = |s: f64| curve.enclose(s, s).re.width();
+    // If nothing is known even at single places, shorter pieces show no more: the values at the ends decide.
+    width <= NOISE * at(m) || ![a, m, b].into_iter().any(|s| at(s).is_finite())
 }
 
 /// Returns true if the values at equidistant places show all zeros of a function that is as slow as the step's

@@ -124,6 +124,14 @@ impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
         }
     }
 
+    fn rates_at(&self, values: &[f64], system: &Self::Built<f64>, t: f64, x: &[f64; D]) -> [f64; D] {
+        match (self, system) {
+            (Either::First(family), Either::First(system)) => family.rates_at(values, system, t, x),
+            (Either::Second(family), Either::Second(system)) => family.rates_at(values, system, t, x),
+            _ => unreachable!("a system of the other family"),
+        }
+    }
+
     fn build_for<S: Scalar>(&self, record: usize, values: &[S]) -> Either<A::Built<S>, B::Built<S>> {
         match self {
             Either::First(family) => Either::First(family.build_for(record, values)),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::sliding_mode::{self, SlidingSurface};
 use super::{
     EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System,
-    choose, enclosed, parameter,
+    choose, enclosed, parameter, sides_of,
 };
 use crate::formula::{Expression, Kinks, Mistake, Names, Place, Program};
 use crate::integrate::{Probes, StepStart, TARGETS, suspect_in_turn};
@@ -20,14 +20,16 @@ pub const MAX_INPUTS: usize = 8;
 #[derive(Debug, PartialEq)]
 struct Law {
     rates: Program,
+    /// The rates with comparisons in place of surfaces.
+    written: Program,
     surfaces: Vec<Program>,
     kinks: Kinks,
 }
 
 impl Law {
-    fn of(equations: &[Expression], kinks: Kinks) -> Self {
+    fn of(equations: &[Expression], written: Program, kinks: Kinks) -> Self {
         let surfaces = kinks.surfaces.iter().map(|own| Program::of([own])).collect();
-        Self { rates: Program::of(equations), surfaces, kinks }
+        Self { rates: Program::of(equations), written, surfaces, kinks }
     }
 }
 
@@ -270,21 +272,21 @@ impl<const D: usize> FormulaFamily<D> {
     ) -> Result<Self, (usize, Mistake)> {
         let live = states.len();
         assert!(live <= D && equations.len() == live, "an equation for each of at most {D} states is needed");
-        let mut parsed = Vec::with_capacity(D);
+        let (mut parsed, mut exact) = (Vec::with_capacity(D), Vec::new());
         for (n, text) in equations.iter().enumerate() {
             let wrong = |what: String| Err((n, Mistake(what)));
             if text.replace("<=", "").replace(">=", "").contains('=') {
                 return wrong("has =, but only the right-hand side is wanted".to_owned());
             }
-            let one = Expression::parse(text, Names { states, parameters, inputs, rates: false });
-            let one = one.map_err(|mistake| (n, mistake))?;
-            parsed.push(one);
+            let names = Names { states, parameters, inputs, rates: false };
+            parsed.push(Expression::parse(text, names).map_err(|mistake| (n, mistake))?);
+            exact.push(Expression::parse_exact(text, names).map_err(|mistake| (n, mistake))?);
         }
         let mut kinks = Kinks { clocked: !inputs.is_empty(), ..Kinks::default() };
         parsed.iter_mut().for_each(|one| kinks.of(one));
         kinks.find_sliding(&parsed);
         let equations = with_idle(parsed);
-        let law = Arc::new(Law::of(&equations, kinks));
+        let law = Arc::new(Law::of(&equations, Program::of(&exact), kinks));
         let states = states.iter().map(|name| (name.clone(), false)).collect();
         let equations = Arc::new(equations);
         let (parameters, inputs, records) = (parameters.to_vec(), inputs.len(), Arc::default());
@@ -326,7 +328,7 @@ impl<const D: usize> FormulaFamily<D> {
     pub fn filled<const E: usize>(&self) -> FormulaFamily<E> {
         let equations = with_idle(self.equations[..self.states.len()].to_vec());
         FormulaFamily {
-            law: Arc::new(Law::of(&equations, self.law.kinks.clone())),
+            law: Arc::new(Law::of(&equations, self.law.written.clone(), self.law.kinks.clone())),
             equations: Arc::new(equations),
             parameters: self.parameters.clone(),
             states: self.states.clone(),
@@ -411,6 +413,23 @@ impl<const D: usize> Family<D> for FormulaFamily<D> {
 
     fn build<S: Scalar>(&self, values: &[S]) -> Own<S, D> {
         self.build_for(self.record, values)
+    }
+
+    fn rates_at(&self, values: &[f64], system: &Own<f64, D>, t: f64, x: &[f64; D]) -> [f64; D] {
+        let (sides, law) = (sides_of(system, t, x), &self.law);
+        let mut rates = system.rates(t, x, &sides);
+        let on = |j: usize| law.kinks.jumps[j] && system.surface(j, t, x, &sides) == 0.0;
+        // There the law is set-valued: what friction does not hold moves as it is let go.
+        let attracts = || sliding_mode::attracts(&system.sliding, x, &sides, &system.rates_on(t, x));
+        if (0..law.surfaces.len()).any(on) && !attracts() {
+            system.evaluate(
+                (&law.written, &law.written.fix(values)),
+                (t, x),
+                &sides,
+                &mut rates[..law.written.len()],
+            );
+        }
+        rates
     }
 
     fn build_for<S: Scalar>(&self, record: usize, values: &[S]) -> Own<S, D> {

@@ -291,6 +291,11 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The system with these parameter values; one with measured inputs feels those of the record that it is of.
     fn build<S: Scalar>(&self, values: &[S]) -> Self::Built<S>;
 
+    /// The rates at a single place of a system that it built, by the law's own words if it jumps there.
+    fn rates_at(&self, _values: &[f64], system: &Self::Built<f64>, t: f64, x: &[f64; D]) -> [f64; D] {
+        System::<f64, D>::rates(system, t, x, &sides_of(system, t, x))
+    }
+
     /// The same with the measured inputs of this record.
     fn build_for<S: Scalar>(&self, _record: usize, values: &[S]) -> Self::Built<S> {
         self.build(values)

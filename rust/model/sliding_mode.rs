@@ -193,6 +193,24 @@ pub fn settle<S: Scalar>(surfaces: &[SlidingSurface<S>], x: &[S], sides: &mut Si
     }
 }
 
+/// Where a state is on a surface to which the law points from both sides, whether it holds or not.
+pub fn attracts<S: Scalar>(
+    surfaces: &[SlidingSurface<S>],
+    x: &[S],
+    sides: &Sides<S>,
+    law: Law<'_, S>,
+) -> S::Mask {
+    let mut any = S::mask(false);
+    for (i, own) in surfaces.iter().enumerate() {
+        let here = own.holds(x);
+        if here.any() {
+            let [below, above] = speeds(surfaces, i, sides, law);
+            any = any.or(here.and(above.less(below)));
+        }
+    }
+    any
+}
+
 /// How fast the law leaves surface `i` upwards on its lower and on its upper side.
 fn speeds<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides<S>, law: Law<'_, S>) -> [S; 2] {
     let own = &surfaces[i];

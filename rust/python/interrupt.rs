@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
 use crate::analysis::CancelFlag;
-use crate::analysis::batch::cancel::{self, Cancelled};
+use crate::integrate::cancel::{self, Cancelled};
 
 /// How often the calling thread looks for signals.
 const POLL: Duration = Duration::from_millis(20);

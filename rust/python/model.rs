@@ -14,7 +14,7 @@ use crate::formula::{Names, is_reserved};
 use crate::model::effects::{Body, Formula, FrictionModel, Kind, Slot, Source};
 use crate::model::{
     DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, MAX_INPUTS, Momentum, Observation,
-    PendulumFamily, Signal, Signals, System, WithLuGre, sides_of,
+    PendulumFamily, Signal, Signals, WithLuGre,
 };
 
 /// The most states and sensors of a user's own model.
@@ -532,7 +532,7 @@ fn rates<'py>(
         for (i, (&t, x)) in t.iter().zip(flat.chunks_exact(live)).enumerate() {
             interrupt::poll(py, i)?;
             let x = state(x, family.idle())?;
-            out.extend_from_slice(&system.rates(t, &x, &sides_of(&system, t, &x))[..live]);
+            out.extend_from_slice(&family.rates_at(values, &system, t, &x)[..live]);
         }
         Ok(out)
     }
@@ -561,7 +561,7 @@ fn observed<'py>(
         interrupt::poll(model.py(), i)?;
         let mut x = [0.0; MAX_STATES];
         x[..live].copy_from_slice(row);
-        let rate = system.rates(t, &x, &sides_of(&system, t, &x));
+        let rate = family.rates_at(values, &system, t, &x);
         let at = Moment { t, x: &x, rate: &rate, parameters: values };
         out.extend_from_slice(&seen(&sensor, &system, &[], &at)[..sensor.channels()]);
     }

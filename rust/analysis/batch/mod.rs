@@ -1,6 +1,5 @@
 //! Many runs at once: lanes of a packet, threads, and how they are stopped.
 
-pub(crate) mod cancel;
 pub(crate) mod lanes;
 pub(crate) mod method_factory;
 pub mod parallel;

@@ -9,7 +9,7 @@ use std::thread;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::cancel;
+use crate::integrate::cancel;
 
 /// Work on a part of a list, given the number of its first.
 type Parts<'a, T, E> = dyn Fn(usize, &mut [T]) -> Result<(), E> + Sync + 'a;

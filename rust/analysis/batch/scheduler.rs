@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::analysis::CancelFlag;
 use crate::analysis::batch::parallel::{self, on_threads};
+use crate::integrate::cancel;
 use crate::scalar::{InstructionSet, Isa, LANES, Packet, Real, Work};
 
 /// Jobs numbered from 0, each taken once, or some of them.
@@ -196,10 +197,11 @@ fn spread<Y: Send>(
     let share = jobs.div_ceil(threads);
     let queue = Queue { next: AtomicUsize::new(0), jobs, share, only, stop: context.stop };
     let all = Mutex::new(all);
+    let flag = cancel::current();
     let watch = || {
         let batch = Vec::with_capacity(ResultSink::<Y>::BATCH.min(jobs));
         let mut results = ResultSink { batch, all: &all, done: context.done };
-        work(&queue, &mut results);
+        cancel::under(flag.clone(), || work(&queue, &mut results));
         results.place();
     };
     on_threads(threads, &watch);

@@ -5,7 +5,7 @@ use std::panic;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::integrate::Failure;
+use super::Failure;
 
 /// Set by one thread, looked at by the threads that work, at least every few microseconds.
 #[derive(Debug, Default)]
@@ -55,10 +55,14 @@ pub fn current() -> Option<Arc<CancelFlag>> {
     CURRENT.with_borrow(Clone::clone)
 }
 
+/// Returns true if the work of this thread was asked to end.
+pub fn is_asked() -> bool {
+    CURRENT.with_borrow(|flag| flag.as_ref().is_some_and(|flag| flag.check().is_err()))
+}
+
 /// Ends the work of this thread, up to where it began, if it was asked to; other threads that share it look themselves.
 pub fn look() {
-    let asked = CURRENT.with_borrow(|flag| flag.as_ref().is_some_and(|flag| flag.check().is_err()));
-    if asked {
+    if is_asked() {
         panic::resume_unwind(Box::new(Cancelled));
     }
 }
