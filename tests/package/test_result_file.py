@@ -60,7 +60,7 @@ def test_a_fit_of_a_model_of_ones_own_comes_back(tmp_path: Path) -> None:
     [
         (udd.Pendulum(1.0), "k0", -0.02, [0.0, 0.3]),
         (udd.Disk(0.001), "W", -0.005, [0.0, 0.0, -0.04, 0.5]),
-        (udd.Disk(0.001), "k1", -0.002, [0.0, 0.0, -0.04, 0.5]),
+        (udd.Disk(0.001), "k1", -0.02, [0.0, 0.0, -0.04, 0.5]),
     ],
 )
 def test_a_fit_outside_the_physical_ranges_comes_back(
@@ -71,7 +71,7 @@ def test_a_fit_outside_the_physical_ranges_comes_back(
     beyond = known.with_parameters({"k0": -0.1, name: value})
     seen = udd.simulate(beyond, t, start).state[:, 1:]
     noise = 1e-4 * np.random.default_rng(1).standard_normal((len(t), columns))
-    options = {"free": [name], "camera": False, "priors": {name: (0.0, 1.0)}}
+    options = {"free": [name], "camera": False, "priors": {name: (0.0, 0.1)}}
     fit = udd.fit(udd.Measurement(t, seen + noise), known.with_parameters({"k0": -0.1}), **options)  # type: ignore[arg-type]
     assert fit.parameters[name] < 0
     again = back(fit, tmp_path)

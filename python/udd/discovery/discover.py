@@ -151,8 +151,9 @@ def discover(
 
     References
     ----------
-    Score test: C. R. Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50. Penalised splines: P. H. C. Eilers and
-    B. D. Marx, Stat. Sci. 11 (1996) 89. Information criterion: G. Schwarz, Ann. Stat. 6 (1978) 461.
+    Score test: C. R. Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50 [54]. Penalised splines: P. H. C. Eilers
+    and B. D. Marx, Stat. Sci. 11 (1996) 89 [56]. Information criterion: G. Schwarz, Ann. Stat. 6 (1978) 461
+    [55].
 
     Examples
     --------
