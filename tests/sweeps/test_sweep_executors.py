@@ -316,7 +316,7 @@ def test_the_command_with_a_dask_cluster(tmp_path: Path) -> None:
         done = subprocess.run(call, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0
     # A slow machine says how far it is, nothing else.
-    assert all(line.startswith("udd: sweep: ") for line in done.stderr.splitlines())
+    assert all(line.startswith("udd: sweep") for line in done.stderr.splitlines()), done.stderr
     found = xr.open_zarr(tmp_path / "killed.zarr", consolidated=False, chunks=None)
     assert found["final_Y"].equals(udd.sweep(spec)["final_Y"])
     finished, ejected = (int((found["outcome"] == value).sum()) for value in (0, 1))
