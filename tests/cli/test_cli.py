@@ -150,7 +150,7 @@ def test_a_solution_that_blows_up_has_a_row(more: list[str], capsys: pytest.Capt
     assert len(head) == len(first) == len(second)
     assert first[:3] == ["1e+300", "nan", "nan"]
     assert float(second[1]) > 0.1
-    assert err == "udd: warning: 1 of 2 solutions blew up and have no exponent\n"
+    assert err == "udd: warning: 1 of 2 solutions blew up and have no exponent; try another --state\n"
 
 
 # --- fit and discover

@@ -223,7 +223,7 @@ def test_the_command(
     assert main([*argv, "--out", str(out), "--out", str(picture)]) == 0
     said = capsys.readouterr().out
     assert "forecast from T = 20 s for 3 s, 20 members" in said
-    assert "valid to 50 mrad to its end" in said
+    assert "valid to 50 mrad until the end of the forecast" in said
     assert out.read_text().splitlines()[0] == "t,theta,theta_low,theta_high"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main([*argv, "--json"]) == 0

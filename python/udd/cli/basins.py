@@ -42,7 +42,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--cycles",
         action="store_true",
-        help="solve for the cycle of each attractor that is one: its period with a bound, its multipliers",
+        help="solve for each attractor that is a cycle: its period with an error bound, its multipliers",
     )
     add_runs(parser, 100)
     add_out(parser)

@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
         "--path",
         choices=("independent", "up", "down", "both"),
         default="independent",
-        help="whether the state is carried from value to value (default independent)",
+        help="start each value at the end of the one before it, up or down, or anew (default independent)",
     )
     add_runs(parser, 200)
     parser.add_argument(

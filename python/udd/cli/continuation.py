@@ -49,7 +49,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--period",
-        help="about the cycle's period (default: found); of a forced model the forcing's, also as a formula",
+        help="approximate period of the cycle (default: searched), or that of the forcing; may be a formula",
     )
     parser.add_argument(
         "--born", type=int, default=0, metavar="N", help="follow branches born on the way, N generations"
@@ -66,7 +66,7 @@ def add(commands: Any) -> None:
         "--view",
         choices=("extremes", "section", "period"),
         default="extremes",
-        help="what of a cycle is drawn (default extremes)",
+        help="values of each cycle that the picture shows (default extremes)",
     )
     add_out(parser, _DATA)
     add_models(parser)
@@ -111,7 +111,7 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
     if args.of == "equilibria":
         found = equilibria(model)
         if not found:
-            raise UddError(f"no equilibrium to follow was found by {found.search}")
+            raise UddError(f"no equilibrium to follow was found by {found.search}; try another value of --at")
         starts += found
     else:
         guess = None if args.state is None else numbers([args.state], "--state")
@@ -154,7 +154,9 @@ def _cascade(args: argparse.Namespace, branches: list[Branch]) -> tuple[dict[str
         p for p in points if p.kind == "symmetry breaking"
     ]
     if not ways:
-        raise UddError("there is no period doubling or symmetry breaking from which a cascade could go on")
+        raise UddError(
+            "--cascade needs a period doubling or symmetry breaking, and none was found; widen --from, --to"
+        )
     doublings = cascade(ways[0], bounds=(args.first, args.last), n=args.cascade)
     data = {
         "values": doublings.values.tolist(),

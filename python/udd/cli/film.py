@@ -24,7 +24,7 @@ def add(commands: Any) -> None:
         commands,
         "film",
         run,
-        "Film a simulated run of the disk, as a camera before it would.",
+        "Film a simulated run of the disk, as a camera in front of it would record it.",
         (
             "udd film run.mp4 --W 0.042 --t 2 --effect relaxation:b=6",
             "udd film small.mp4 --W 0.042 --t 1 --size 220x280",

@@ -44,12 +44,14 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--window",
         type=float,
-        help="time before it from which the state is filtered [s] (default 1; a pendulum 4)",
+        help="length of record before --start that determines the state there [s] (default 1; a pendulum 4)",
     )
     parser.add_argument("--members", type=int, default=200, help="size of the ensemble (default 200)")
     parser.add_argument("--level", type=float, default=0.95, help="share within the band (default 0.95)")
     parser.add_argument(
-        "--error", type=float, help="until which it is valid [m, or rad] (default 0.005; a pendulum 0.05)"
+        "--error",
+        type=float,
+        help="error up to which the forecast is valid [m, or rad] (default 0.005; a pendulum 0.05)",
     )
     parser.add_argument("--seed", type=int, default=0, help="another seed, another ensemble (default 0)")
     add_out(parser, _DATA)
@@ -103,7 +105,7 @@ def describe(prediction: Forecast) -> str:
             f"({100 * prediction.level:g} % of the members: {prediction.valid_low:.3g} to {latest} s)"
         )
     else:
-        lines.append(f"  valid to {within} to its end")
+        lines.append(f"  valid to {within} until the end of the forecast")
     if math.isfinite(prediction.lyapunov_time):
         times = (
             f"; valid for {prediction.lyapunov_times:.2g} of them"

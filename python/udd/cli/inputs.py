@@ -74,8 +74,8 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         nargs="?",
         const="",
         metavar="COLUMN",
-        help="a gyroscope measured the pendulum's rate of turning: its column (default: of those in rad/s or "
-        "deg/s the one that varies most; so it is taken where a table has no angle)",
+        help="the column with the pendulum's rate of turning (default: the column in rad/s or deg/s that "
+        "varies most); a table without an angle is read this way without the option, too",
     )
     parser.add_argument(
         OPTIONS["rate"],
@@ -95,7 +95,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         dest="part",
         type=int,
         metavar="N",
-        help="where the clock jumps back: which of its runs, from 0",
+        help="if the clock jumps back, the file holds several runs: the run to read (the first is 0)",
     )
     parser.add_argument(
         OPTIONS["limit"],
@@ -109,7 +109,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         parser.add_argument(
             "--each",
             metavar="NAMES",
-            help="of several files, what each has a value of its own of (default: W)",
+            help="with several files: the parameters with a separate value for each file (default: W)",
         )
     parser.add_argument(
         "--free",
@@ -361,7 +361,7 @@ def check_early(args: argparse.Namespace) -> None:
     for one in _each(args):
         _check_device(one)
     if len(args.files) == 1 and getattr(args, "each", None) is not None:
-        raise UddError("--each takes several files: of one nothing can have a value for each")
+        raise UddError("--each needs two or more files; leave it out for one file")
     if all(map(is_film, args.files)):
         for name in ("columns", "sampling", "repeated", "part", "limit"):
             if getattr(args, name) is not None:

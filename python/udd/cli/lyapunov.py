@@ -141,7 +141,9 @@ def _swept(args: argparse.Namespace) -> _Swept:
         values = [float(x) for x in np.linspace(args.first, args.last, args.n)]
     other = any(getattr(args, name) is not None for name in ("W", "pendulum", "model"))
     if other and args.w:
-        raise UddError("drives without an option are those of the DLE: say one model")
+        raise UddError(
+            "numbers without an option are drives of the DLE, but another model is given; remove one of them"
+        )
     if other or args.over == "W":
         args.w = None
         first = None if values is None or args.over not in (None, "W") else values[0]
@@ -242,5 +244,5 @@ def _tell(rows: list[_Row], args: argparse.Namespace) -> None:
             stacklevel=3,
         )
     if absent:
-        message = f"{absent} of {len(rows)} solutions blew up and have no exponent"
+        message = f"{absent} of {len(rows)} solutions blew up and have no exponent; try another --state"
         warnings.warn(message, ConvergenceWarning, stacklevel=3)

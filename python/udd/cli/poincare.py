@@ -149,5 +149,5 @@ def _check(args: argparse.Namespace) -> None:
         raise UddError(f"{args.out}: there is no folder {args.out.parent}")
     checked([path for path in (args.picture, args.map) if path is not None], ())
     if args.map is not None and args.section is not None and len(args.section) > 1:
-        raise UddError("--map takes one --section: a return map is that of one surface")
+        raise UddError("--map takes one --section; give one, or leave out --map")
     check_count("points", args.points, 1)

@@ -112,7 +112,7 @@ def add(commands: Any) -> None:
         "--slip",
         type=float,
         metavar="M/S",
-        help="with --smooth: take dY/dT = Z Omega for true, up to this standard error",
+        help="with --smooth: assume that the disk rolls, dY/dT = Z Omega, with this standard error",
     )
     parser.add_argument(
         "--overlay",

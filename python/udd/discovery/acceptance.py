@@ -84,7 +84,7 @@ class Step:
     @property
     def is_curve(self) -> bool:
         """True for a curve without a formula."""
-        return self.curve is not None and self.candidates[0].title == self.curve.title
+        return self.curve is not None and self.formula is None
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ class Acceptance:
         most = max((h.log_z for h in order), default=0.0)
         for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
             trial = self._in_other_widths(current, chosen.trial, scores.library)
-            judged = self.judged(current, trial, scores)
+            judged = self.judged(current, trial, scores, chosen.again if trial is chosen.trial else None)
             if judged is None or judged.witness is None:
                 continue
             errors = self.errors_or_none(trial.fit)
@@ -355,10 +355,16 @@ class Acceptance:
             result if result.converged and result.level >= fitted.level and not ran_away(result) else fitted
         )
 
-    def judged(self, current: SearchState, trial: TrialFit, scores: ScoreRound) -> TestResult | None:
-        """Run the tests of a trial; None if it cannot be fitted to all data."""
+    def judged(
+        self,
+        current: SearchState,
+        trial: TrialFit,
+        scores: ScoreRound,
+        fit_of_all: TrialFit | None = None,
+    ) -> TestResult | None:
+        """Run the tests of a trial, with its fit of all data if it is known; None if that fit fails."""
         try:
-            whole = self._again(current, trial)
+            whole = fit_of_all or self._again(current, trial)
             if whole is None:
                 return None
             pair = same_level(current.whole, whole.fit)

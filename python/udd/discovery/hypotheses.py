@@ -213,8 +213,8 @@ def rivals(
 ) -> list[Hypothesis]:
     """Return the hypotheses that the data cannot distinguish from the chosen one.
 
-    They are within ten nats of it. Excluded are splines if a law was chosen, laws that the chosen one
-    contains, and laws that contain it with more constants and no gain.
+    They are within ten nats of it. These are no rivals: splines, if a law was chosen; formulas that the
+    chosen law contains; laws that contain it with more constants and no gain.
     """
     result = []
     for other in others:

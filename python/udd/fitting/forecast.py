@@ -422,7 +422,9 @@ def _drawn(
             ), draw
         except ModelError:
             continue
-    raise FitError("the fit leaves its parameters so uncertain that their draws are invalid for the model")
+    raise FitError(
+        "the fitted parameters are too uncertain for a forecast; use a longer record or fix some of them"
+    )
 
 
 def _draws(fitted: Fit, scale: float, rng: np.random.Generator) -> Iterator[Mapping[str, float]]:

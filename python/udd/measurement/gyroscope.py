@@ -69,8 +69,8 @@ def read_gyroscope(
     signed = [k for k, one in enumerate(read) if np.nanmin(one.values) < 0.0 < np.nanmax(one.values)]
     if not signed:
         raise MeasurementError(
-            f"{path}: no column is a rate of turning that takes both signs; a heading should state rad/s "
-            "or deg/s"
+            f"{path}: no column in rad/s or deg/s has values of both signs; write the unit into the heading, "
+            "or name the column"
         )
     best = max(signed, key=lambda k: float(np.nanstd(read[k].values)))
     return read[best].with_meta(gyroscope=names[best])

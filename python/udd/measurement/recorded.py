@@ -113,7 +113,7 @@ class Recorded:
         else:
             clocks = ", ".join(table.name or f"{len(table)} rows" for table in self.tables)
             raise MeasurementError(
-                f"{', '.join(names)} lie in tables with clocks of their own ({clocks}): read them one by one"
+                f"{', '.join(names)} are in tables with different clocks ({clocks}); read each by columns="
             )
         raise self.missing("t")
 
@@ -172,7 +172,9 @@ class Frames:
         x, y = (self.table.numbers(k) for k in places)
         units = {self.table.headings[k].unit for k in places}
         if len(units) > 1:
-            raise MeasurementError(f"the columns {' and '.join(asked)} are in different units")
+            raise MeasurementError(
+                f"the columns {' and '.join(asked)} are in different units; give both the same"
+            )
         self.used |= {self.table.headings[k].raw for k in places}
         self.sources[name] = f"atan2(x, -y) of {' and '.join(asked)}"
         return np.arctan2(x, -y)
@@ -268,7 +270,7 @@ def _rows(record: Recorded, t: NDArray[np.float64]) -> NDArray[np.int64] | None:
         parts = np.split(rows, np.flatnonzero(np.diff(t) < 0) + 1)
         if not 0 <= record.part < len(parts):
             raise MeasurementError(
-                f"there is no part {record.part}: the clock runs {len(parts)} times, from 0"
+                f"there is no part {record.part}: the file has {len(parts)} runs, numbered from 0"
             )
         rows = parts[record.part]
     if record.repeated == "first":

@@ -83,7 +83,7 @@ def verdict(discovery: Discovery) -> str:
         return said
     return (
         f"{said} The search ended after {discovery.budget:.3g} s, as asked, while "
-        f"{discovery.stopped}; further effects were not tried."
+        f"{discovery.stopped}; further effects were not tried. A larger budget tries them."
     )
 
 
@@ -113,7 +113,7 @@ def _verdict(discovery: Discovery) -> str:
         )
     if discovery.verdict == "effect identified":
         return f"{said[0].upper()}{said[1:]}."
-    return f"The model lacks something. Most likely {said}; but this record does not settle its form."
+    return f"The model lacks something. Most likely {said}; but this record does not determine its form."
 
 
 def _counted(sentences: list[str]) -> list[str]:
@@ -279,8 +279,8 @@ def confirmed_by(effect: AddedEffect) -> str:
     if effect.witness == "fitted":
         return f"{cost}; in a fit that includes them, χ² decreased by more than chance would."
     return (
-        f"{cost}: they hardly show it. In each half of the record, taken in alternate stretches, χ² "
-        "decreased by more than chance would allow, given the other half."
+        f"{cost}: they hardly show it. The record was also cut into two halves of alternate stretches. In "
+        "each half, χ² decreased by more than chance allows."
     )
 
 

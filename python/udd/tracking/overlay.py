@@ -47,7 +47,9 @@ def overlay(video: str | os.PathLike[str], measurement: Measurement, path: str |
 
     require_video()
     if "px_per_m" not in measurement.meta:
-        raise ValueError("the measurement does not come from a film, so it has no places in pictures to draw")
+        raise ValueError(
+            "the measurement does not come from a film, so it cannot be drawn on one; use one from udd.track"
+        )
     film = Film(video)
     film.correct = correction_of(measurement.meta, measurement.quality, film.full_range)
     target = checked_path(path)
