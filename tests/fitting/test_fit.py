@@ -56,9 +56,9 @@ def test_leaps_over_levels_end_where_single_steps_do(hidden, monkeypatch):
     leapt = udd.fit(measured, start)
     monkeypatch.setattr(model_error_schedule, "_skip_levels", lambda *_: None)
     stepped = udd.fit(measured, start)
-    # A right model gets a small model error; a wrong one only the most probable one.
-    right = leapt.problem.right
-    assert leapt.level > right if not hidden else 0 < leapt.level < right
+    # A right model gets the smallest model error; a wrong one only the most probable one.
+    last = len(leapt.problem.schedule) - 1
+    assert leapt.level == last if not hidden else 0 < leapt.level < last
     assert stepped.level == leapt.level
     assert leapt.evidence == pytest.approx(stepped.evidence, abs=model_error_schedule.LESS)
     for name, value in stepped.parameters.items():

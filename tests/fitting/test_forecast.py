@@ -58,10 +58,8 @@ def test_the_fan_of_a_pendulum_covers_as_often_as_it_says() -> None:
 
 @pytest.mark.slow
 def test_the_fan_of_a_disk_covers_the_truth() -> None:
-    """A band of 0.9 by 60 members should cover 0.87 of the truth.
-
-    In a larger experiment (120 forecasts, two seeds) it covers 0.86; scaled errors are 1.06 (r.m.s.).
-    """
+    """The assumed model error is larger than that of a simulated disk, none, so that the fan is on the wide
+    side: 0.95 of the truth in a band of 0.9 in a larger experiment (60 forecasts, two seeds)."""
     ahead, inside, z = np.array([0.0, 0.4, 1.0, 2.0, 4.0]), [], []
     for rng in np.random.default_rng(1).spawn(6):
         truth = udd.Disk(rng.uniform(0.03, 0.05))
@@ -76,7 +74,7 @@ def test_the_fan_of_a_disk_covers_the_truth() -> None:
             inside.append((there >= result.low) & (there <= result.high))
             z.append((there - np.nanmean(result.members, axis=0)) / np.nanstd(result.members, axis=0))
     # 24 forecasts, few of them independent at later times.
-    assert np.mean(inside) > 0.75
+    assert np.mean(inside) > 0.85
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.15
 
 

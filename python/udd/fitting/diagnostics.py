@@ -261,9 +261,10 @@ class Diagnostics:
 
 def doubts(fit: Fit) -> Diagnostics:
     """Diagnose a fit: model error, innovations, runaway parameters, noise, units."""
+    last = len(fit.problem.schedule) - 1
     noisy = noisy_inputs(fit.measurements, fit.model.inputs)
     missed, white = _missed(fit), _white(fit)
-    tight = fit.level >= fit.problem.right - _NEARLY
+    tight = fit.level >= last - _NEARLY
     by_inputs = [] if tight else _by_inputs(fit, missed, noisy)
     tight = tight or bool(by_inputs)
     # A model error that always follows a parameter's own effect, with one sign, moves that parameter by as
@@ -352,7 +353,7 @@ def _missed(fit: Fit) -> list[ModelError]:
         if profile_units is None
         else profile_units
     )
-    now, best = fit.model_error, fit.problem.schedule[fit.problem.right]
+    now, best = fit.problem.diffusion, fit.problem.schedule[-1]
     root = np.sqrt(step)
     return [
         ModelError(name, unit, now[order.index(name)] / root, best[order.index(name)] / root)

@@ -20,21 +20,9 @@ from udd.models.formula_model import FormulaModel
 
 from .continuous import continuous
 from .estimator_input import FilmParameters
-from .formula_models import driven
+from .formula_models import driven, levels_of
 from .input_noise import LEVEL_RATIO, diffusion_by_noise
-from .model_error_levels import model_error_levels
-from .model_error_schedule import (
-    ANY,
-    FEW,
-    LEAP,
-    LESS,
-    ROUGH,
-    Goal,
-    eased,
-    provisional_fit,
-    reduce_model_error,
-    with_negligible_model_error,
-)
+from .model_error_schedule import ANY, FEW, LEAP, ROUGH, Goal, provisional_fit, reduce_model_error
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera, names_of
 from .problem import FOLLOWS, Fit, Point, Problem, levels
@@ -196,13 +184,15 @@ def fit_record(
     if camera is True and zero is not None and all(is_encoder(film) for film in measurements):
         camera = (zero,)  # an encoder has no perspective
     parameters = free_parameters(models, free, camera, priors, each)
-    levels_searched = levels(kind)[: profile.fit.searched] if search else ()
-    schedule = levels_searched or model_error_levels(models[0], record)
+    if isinstance(models[0], FormulaModel):
+        schedule = levels_of(models[0], record.t, record.states, record.sigma, record.linked)
+    else:
+        schedule = levels(kind)[: profile.fit.searched if search else None]
     problem = Problem(models, record, parameters, stated(record), schedule, schedule[0], not search)
     point = _start(models, measurements, record)
     if search and models[0].inputs:  # a fit finds the model error itself
         problem = _with_input_noise(measurements, problem, point)
-    return with_negligible_model_error(_anneal(measurements, problem, point))
+    return _anneal(measurements, problem, point)
 
 
 def _with_input_noise(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Problem:
@@ -503,10 +493,7 @@ def refit(fitted: Fit, *, trusted: bool = False) -> Fit:
     In a search the noise stays that of the first model, so that chi2 can be compared. The noise of a film
     stays at its assumed value unless the geometry is `trusted`.
     """
-    schedule, first = fitted.problem.schedule, fitted.level
-    if not fitted.model.profile.written:
-        schedule = model_error_levels(fitted.problem.models[0], fitted.record)
-        first = min(first, len(schedule) - 1)
+    schedule = levels(fitted.model.kind) or fitted.problem.schedule
     problem = replace(fitted.problem, schedule=schedule, likeliest=True)
     misfits: Misfits = "little"
     point = fitted.point
@@ -515,10 +502,10 @@ def refit(fitted: Fit, *, trusted: bool = False) -> Fit:
             misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
         if misfits != "noise":
             problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
-        result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[first:])
+        result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
     except SolveError:  # for example, a threshold that ends at or below zero
         return fitted
-    return with_negligible_model_error(result) if result.converged else fitted
+    return result if result.converged else fitted
 
 
 def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Fit:
@@ -541,7 +528,7 @@ def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Poin
                 loose = _likeliest_noise(loose, problem.schedule[number + 1 :])
             tighter = problem.schedule[loose.level + 1 :]
             if not tighter:
-                return eased(loose) if problem.likeliest else loose
+                return loose
             return reduce_model_error(measurements, loose.problem, _afresh(loose), tighter, loose)
     # If the noise never shows, or is below the model's faults, the film is very precise: use its stated
     # noise.
@@ -628,9 +615,7 @@ def _estimate_noise(
             return "faults", problem, point
         if result.leverage > FOLLOWS:
             return "little", problem, point
-        shown = result.misfit, result.misfit_variance
-        gain = LESS if problem.likeliest else 0.0
-        noise = estimated(problem.record, result.blurring, *shown, before, gain)
+        noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
         if is_known and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return "faults", problem, point
         noise = replace(noise, factor=np.maximum(noise.factor, least))

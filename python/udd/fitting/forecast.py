@@ -281,7 +281,7 @@ def forecast(
     if isinstance(film_model, FormulaModel) and film_model.inputs:
         (film_model,) = driven((film_model,), (measurement,), origin)
     models, cameras, states = _starts(fitted, film_model, film, part, checked, scale, random)
-    kicks = scale * np.array(fitted.model_error) if process else np.zeros(states.shape[1])
+    kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
     runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, random)
@@ -387,7 +387,7 @@ def _starts(
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Draw every member's model, camera and state at the window's end."""
     seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
-    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.model_error
+    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
     window = [(0, len(part.t) - 1)]
     models, cameras, states = [], [], []
     free = [f for f in fitted.problem.free if f.film in (None, film)]

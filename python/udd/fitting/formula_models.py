@@ -1,4 +1,4 @@
-"""User-defined models in a fit: first guesses of states, and noise that a record does not state."""
+"""User-defined models in a fit: first guesses of states, and sizes from the record."""
 
 from __future__ import annotations
 
@@ -17,8 +17,15 @@ from .sensor import roughness
 
 Array = NDArray[np.float64]
 
+#: The assumed model error over a frame, from large to small, in units of the largest. For an observed state
+#: the largest is a share of its noise, as for disk and pendulum, but at least a small share of its change
+#: from frame to frame. For an unobserved state it is a larger share of that change.
+_LEVELS = (1.0, 0.3, 0.06, 1e-2, 1e-3, 1e-4)
+_OF_NOISE, _OF_CHANGE, _UNSEEN = 0.2, 0.02, 0.3
 #: Samples of an input that may be missing at a measurement's ends; the nearest sample is used there.
 _LATE = 2.0
+_NOISIER = 0.9  # quantile over the frames that counts as a channel's noise
+_SAMPLED = 50  # frames that show how noise enters the states
 
 
 def slope(t: Array, x: Array, linked: NDArray[np.bool_]) -> Array:
@@ -181,3 +188,48 @@ def typical_noise(values: Array) -> Array:
     """Estimate a measurement's noise from its roughness, if it does not state one."""
     result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + 1e-300)
     return result
+
+
+def levels_of(
+    model: FormulaModel, t: Array, states: Array, sigma: Array, linked: NDArray[np.bool_]
+) -> tuple[tuple[float, ...], ...]:
+    """Return the assumed model errors, large to small, per square root of the unit of time.
+
+    Parameters
+    ----------
+    model : FormulaModel
+    t, states : ndarray (n,), (n, d)
+        A first guess.
+    sigma : ndarray (n, c)
+        The noise of the observations, for each of the model's channels; infinite if not observed.
+    linked : ndarray of bool (n - 1,)
+    """
+    dt = np.diff(t)[linked]
+    step = float(np.median(dt)) if len(dt) else 1.0
+    change = np.sqrt((np.diff(states, axis=0)[linked] ** 2).sum(axis=0) / max(len(dt), 1))
+    # An unknown state changes as the model says.
+    rates = np.median(np.abs(model.rates(t, states)), axis=0) * step
+    change = np.where(change > 0, change, rates)
+    change = np.where(change > 0, change, float(change.max()) or 1.0)
+    noise = state_noise(model, t, states, sigma)
+    seen = np.isfinite(noise)
+    # With a larger model error an observed state would follow every frame.
+    loosest = np.where(seen, np.clip(_OF_NOISE * noise, _OF_CHANGE * change, change), _UNSEEN * change)
+    return tuple(tuple((level * loosest / np.sqrt(step)).tolist()) for level in _LEVELS)
+
+
+def state_noise(model: FormulaModel, t: Array, states: Array, sigma: Array) -> Array:
+    """Return the noise of each state as sensors show it, (d,); infinite if they do not show it."""
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(sigma).any(axis=0))
+    typical = np.full(len(seen), np.inf)
+    for k in np.flatnonzero(seen):
+        typical[k] = np.quantile(sigma[np.isfinite(sigma[:, k]), k], _NOISIER)
+    if not model.observe:
+        return typical
+    frames = np.linspace(0, len(t) - 1, _SAMPLED).astype(int)
+    names = [name for name, there in zip(model.channels, seen, strict=True) if there]
+    values = dict(zip(names, model.observed(t[frames], states[frames])[:, seen].T, strict=True))
+    noise = dict(zip(names, typical[seen].tolist(), strict=True))
+    result = inverted(model, t[frames], values, noise, states[0])
+    spread = np.sqrt(np.median((result.slopes**2 @ typical[seen] ** 2), axis=0))
+    return np.where(result.shown, spread, np.inf)

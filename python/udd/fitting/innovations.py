@@ -64,7 +64,7 @@ def innovations(fit: Fit) -> Innovations:
     The parameters are fixed. The filter runs along the fitted motion, around which everything is linear, with
     the noise and the model error that the fit assumed.
     """
-    problem = replace(fit.problem, noise=fit.noise, diffusion=fit.model_error)
+    problem = replace(fit.problem, noise=fit.noise)
     vague = np.ptp(fit.states, axis=0).tolist()
     values = _core.innovations(replace(problem.at(fit.point), free=()), vague)
     is_tested = np.isfinite(values).sum(axis=0) >= _FEWEST

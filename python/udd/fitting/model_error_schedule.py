@@ -10,7 +10,6 @@ import numpy as np
 from udd.errors import FitError
 from udd.measurement import Measurement
 
-from .model_error_levels import negligible_levels
 from .noise import estimated, noise_autocorrelation
 from .problem import Fit, Point, Problem
 from .record import Record
@@ -29,8 +28,6 @@ _LITTLE = 3  # further steps for a fit that may be close to its minimum
 _FAR_OFF = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
 _LOOSE = 0.3  # leverage above which misfits do not show the noise
 _SAME = 0.03  # autocorrelations that differ by less need no further fit
-#: Relative change of standard errors below which a smaller model error shows nothing new.
-_UNCHANGED = 2e-3
 
 
 @dataclass(frozen=True)
@@ -181,25 +178,21 @@ def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -
 
 
 def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
-    """Increase the model error again, level by level, if that is more probable.
+    """Increase the model error again, level by level, as long as the evidence rises.
 
-    Levels as probable as the smallest one may lie between it and a more probable one. A level at which a
-    parameter leaves its range is the end.
+    A level at which a parameter leaves its range is the end.
     """
-    best, point = fitted, fitted.point
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
         problem = fitted.problem.with_model_error(diffusion)
         try:
-            looser = solve(fitted.measurements, problem, point, decrease=ROUGH)
+            looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
         except SolveError:
             # Without this Stribeck's friction on a shaken support ends a search with an error.
             break
-        if looser.evidence < best.evidence - LESS:
+        if _stands(fitted, looser):
             break
-        point = looser.point
-        if not _stands(best, looser):
-            best = looser
-    return best
+        fitted = looser
+    return fitted
 
 
 def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fit:
@@ -211,31 +204,6 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
         if fitted.converged:
             break
     return fitted
-
-
-def with_negligible_model_error(fitted: Fit) -> Fit:
-    """Reduce the model error of a right model until the standard errors no longer depend on it.
-
-    The standard errors then are those of the law itself, whatever the model error that the fit began with.
-    """
-    # Without this the standard errors of a chaotic disk are up to 1.5 times too large.
-    if not fitted.problem.likeliest:
-        return fitted
-    schedule = fitted.problem.schedule
-    levels = negligible_levels(schedule)
-    problem = replace(fitted.problem, schedule=(*schedule, *levels), negligible=len(levels))
-    result = replace(fitted, problem=problem)
-    for diffusion in levels if fitted.converged and _is_last(fitted.problem) else ():
-        try:
-            tighter = solve(fitted.measurements, problem.with_model_error(diffusion), result.point, STEPS)
-        except FitError:
-            break
-        if not _stands(tighter, result):
-            break
-        before, result = result, tighter
-        if all(abs(result.errors[name] / error - 1.0) < _UNCHANGED for name, error in before.errors.items()):
-            break
-    return result
 
 
 def with_noise_correlation(fitted: Fit) -> Fit:
@@ -251,8 +219,7 @@ def with_noise_correlation(fitted: Fit) -> Fit:
     memory = noise_autocorrelation(fitted.record, fitted.misfit, sd, fitted.noise.weight)
     if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
         return fitted
-    shown = fitted.misfit, fitted.misfit_variance
-    noise = estimated(fitted.record, fitted.blurring, *shown, fitted.noise, LESS)
+    noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
     problem = replace(fitted.problem, noise=replace(noise, memory=memory))
     result = solve(fitted.measurements, problem, fitted.point, STEPS, _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted

@@ -87,14 +87,7 @@ def stated(record: Record) -> Noise:
     return Noise(np.ones(channels), np.zeros(channels), weight, np.zeros(channels))
 
 
-def estimated(
-    record: Record,
-    omega: Array,
-    misfit: Array,
-    seen_variance: Array,
-    before: Noise,
-    least_gain: float = 0.0,
-) -> Noise:
+def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array, before: Noise) -> Noise:
     """Estimate the noise from a fit's misfits.
 
     Parameters
@@ -108,8 +101,6 @@ def estimated(
         Variance of the fitted values; the squared misfits are smaller than the noise by it.
     before : Noise
         The noise that the fit assumed.
-    least_gain : float
-        Log likelihood that growth with the speed must gain; noise that gains less is constant.
     """
     seen = record.observed
     assumed = before.sd(record, omega)
@@ -134,28 +125,14 @@ def estimated(
         power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)
         least = _EXACT * np.abs(record.seen[use, m]).max()
         terms = np.column_stack([record.sigma[use, m] ** 2, omega[use] ** 2])
-        floor = 1e-6 * power.mean() + least**2 + 1e-300
-        shares, shown_variance = _components(terms, power, variance, floor)
-        if least_gain and shares[1] > 0.0:
-            constant, alone = _components(terms * [1.0, 0.0], power, variance, floor)
-            gain = np.log(alone / shown_variance) + power / alone - power / shown_variance
-            shares = shares if 0.5 * float(gain.sum()) > least_gain else constant
-        factor[m], blur[m] = np.sqrt(shares)
+        for _ in range(3):  # the scatter of a squared misfit grows with its own expectation
+            scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
+            share, _residual = nnls(terms / scale / variance[:, None], power / variance)
+            variance = np.maximum(terms / scale @ share, 1e-6 * power.mean() + least**2 + 1e-300)
+        factor[m], blur[m] = np.sqrt(share / scale)
         smallest = np.sqrt((1e-6 * power.mean() + least**2) / (record.sigma[use, m] ** 2).mean())
         factor[m] = max(factor[m], smallest)
     return Noise(factor, blur, weight, before.memory)
-
-
-def _components(terms: Array, power: Array, variance: Array, floor: float) -> tuple[Array, Array]:
-    """Estimate the non-negative shares of variance `terms` in squared misfits, and return them and the sum.
-
-    `variance` is a first guess.
-    """
-    scale = np.sqrt((terms**2).mean(axis=0)) + 1e-300
-    for _ in range(3):  # the scatter of a squared misfit grows with its own expectation
-        share, _residual = nnls(terms / scale / variance[:, None], power / variance)
-        variance = np.maximum(terms / scale @ share, floor)
-    return share / scale, variance
 
 
 def noise_autocorrelation(record: Record, misfit: Array, sd: Array, weight: Array) -> Array:

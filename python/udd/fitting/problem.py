@@ -53,8 +53,6 @@ class Problem(OneLine):
         One per film; they differ only in parameter values.
     likeliest : bool
         True if the model error is the most probable one; else it is as small as possible.
-    negligible : int
-        The number of levels at the end of the schedule where the model error no longer counts.
     """
 
     models: tuple[Model, ...]
@@ -64,12 +62,6 @@ class Problem(OneLine):
     schedule: tuple[tuple[float, ...], ...]
     diffusion: tuple[float, ...]
     likeliest: bool = True
-    negligible: int = 0
-
-    @property
-    def right(self) -> int:
-        """The level of a right model: the last one where the model error counts."""
-        return len(self.schedule) - 1 - self.negligible
 
     def with_model_error(self, diffusion: tuple[float, ...]) -> Problem:
         """Return the problem with another model error, per square root of a second."""
@@ -221,13 +213,6 @@ class Fit(Drawable):
     def level(self) -> int:
         """Index of the model error in the schedule: a higher level is a smaller error."""
         return self.problem.schedule.index(self.problem.diffusion)
-
-    @property
-    def model_error(self) -> tuple[float, ...]:
-        """The model error that a filter assumes: that of the fit, but no negligible one."""
-        problem = self.problem
-        negligible = problem.diffusion in problem.schedule and self.level > problem.right
-        return problem.schedule[problem.right] if negligible else problem.diffusion
 
     @property
     def scatter(self) -> float:

@@ -15,7 +15,7 @@ from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .estimator_input import EstimatorInput, FilmParameters, Observations
-from .model_error_levels import state_noise
+from .formula_models import state_noise
 from .problem import Fit, Point, Problem
 from .record import Record
 
@@ -111,7 +111,7 @@ def _said(error: ValueError, problem: Problem) -> str:
         )
     model = problem.models[0]
     if "do not determine the state" in str(error) and isinstance(model, FormulaModel):
-        noise = state_noise(model, problem.record)
+        noise = state_noise(model, problem.record.t, problem.record.states, problem.record.sigma)
         hidden = [name for name, sd in zip(model.state_names, noise, strict=True) if not np.isfinite(sd)]
         asked = ", ".join(f"'{name}': ..." for name in hidden)
         if hidden:
