@@ -29,3 +29,13 @@ def shared() -> Path:
     if not path.is_dir():
         pytest.skip("needs ../shared (recordings beside the repository), which is absent here")
     return path
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder with the examples, in which the commands of the documentation run."""
+    from udd.examples import write
+
+    made = tmp_path_factory.mktemp("examples")
+    assert all(file.is_file() for file in write("all", made))
+    return made

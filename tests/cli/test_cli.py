@@ -249,7 +249,7 @@ def test_a_record_is_held_out_by_its_name_or_number(
     assert "number from 0 to 2" in failed([*argv, "3"], capsys)
     assert "none is left to fit" in failed([*argv, "0", "--held-out", "1", "--held-out", "2"], capsys)
     assert "does not go with --each" in failed([*argv, "0", "--each", "k"], capsys)
-    assert "takes several files" in failed(
+    assert "needs several files" in failed(
         ["discover", files[0], "--model", model, "--held-out", "0"], capsys
     )
 
@@ -413,7 +413,7 @@ OWN = {
         (["--pendulum", "0.6", "--free", ""], "--free names no parameter"),
         (["--pendulum", "0.6", "--free", "k0", "--free", "k7"], "no parameter 'k7'"),
         (["--pendulum", "0.6", "--free", "k7", "--free", "k0"], "no parameter 'k7'"),
-        (["--pendulum", "0.6", "--each", "k0"], "--each takes several files"),
+        (["--pendulum", "0.6", "--each", "k0"], "--each needs two or more files"),
     ],
 )
 def test_options_that_would_do_nothing_are_refused(

@@ -31,7 +31,7 @@ def test_a_search_whose_model_explains_its_data_is_not_finished_without_time():
     result = udd.discover(measured, right, budget=1e-6)
     assert result.verdict == "search not finished"
     assert as_text(summary_of(result)).startswith(
-        "search not finished: Whether something is missing is not known yet"
+        "search not finished: The search has not ended: no missing effect was found so far"
     )
 
 

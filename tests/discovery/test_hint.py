@@ -101,7 +101,7 @@ def test_a_weak_doubt_that_no_film_settles_is_said_so():
     )
     (hint,) = faint.hints
     assert hint.design == "" and hint.nats < SEPARATED
-    assert hint.text.startswith("no feasible film would part them")
+    assert hint.text.startswith("no feasible film would separate them")
 
 
 @pytest.mark.parametrize("model", [udd.Disk(DRIVE), udd.Disk(0.0), udd.Pendulum(0.6, k0=0.01)])

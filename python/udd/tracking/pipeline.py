@@ -477,8 +477,9 @@ def pictures_at(
 
 def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> Film:
     """Open a film with the corrections of a measurement."""
-    rate = 1.0 if tracked is None else float(tracked.meta["fps"])
-    film = Film(video, fps=rate if Path(video).is_dir() else None)  # pictures have no times
+    # Pictures have no times: a folder of them takes its rate from the measurement.
+    rate = (1.0 if tracked is None else float(tracked.meta["fps"])) if Path(video).is_dir() else None
+    film = Film(video, fps=rate)
     if tracked is not None:
         film.correct = correction_of(tracked.meta, tracked.quality, film.full_range)
     return film
