@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
         action=OutputFile,
         endings=(".pdf",),
         metavar="PDF",
-        help="file to write (default: marks.pdf or tags.pdf); the layout comes into a .toml beside it",
+        help="file to write (default: marks.pdf or tags.pdf); the layout is written to a .toml next to it",
     )
 
 

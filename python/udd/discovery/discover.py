@@ -50,7 +50,7 @@ from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
 
-#: Share of the record for training; the rest is held-out data.
+#: Share of the record for training; the rest is for tests.
 TRAIN = 0.6
 _SHORTEST = 20  # frames; with fewer the training part determines no model and the rest tests none
 

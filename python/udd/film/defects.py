@@ -164,7 +164,7 @@ class Defects:
 
 
 def source_of_pixels(camera: Camera, defects: Defects) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the place (x, y) of each pixel of the bent picture in a true-to-scale one.
+    """Return the place (x, y) of each pixel of the distorted picture in a true-to-scale one.
 
     A pinhole camera at `distance` looks at the pivot from beside and below. The lens then moves points inward
     by the factor 1 - lens r^2, r being the distance from the picture's middle (corner: 1).
