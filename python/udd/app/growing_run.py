@@ -203,9 +203,7 @@ def as_csv(start: Start, seconds: float, shown: bool = False) -> str:
     units += [_SHOWN.get(unit, (unit, 1.0)) for unit in start.model.state_units]
     lines += [f"# {text}" for text in _parameters(start.model)]
     lines.append(
-        ",".join(
-            f"{name} [{unit}]" if unit else name for name, (unit, _) in zip(("t", *names), units, strict=True)
-        )
+        ",".join(_with_unit(name, unit) for name, (unit, _) in zip(("t", *names), units, strict=True))
     )
     table *= [scale for _, scale in units]
     lines += [",".join(f"{value:.10g}" for value in row) for row in table.tolist()]
@@ -215,13 +213,15 @@ def as_csv(start: Start, seconds: float, shown: bool = False) -> str:
 _SHOWN = {"m": ("cm", 100.0)}  # the units of the page's reader
 
 
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
 def _parameters(model: Model) -> list[str]:
     """Each parameter with its unit on the page, then the effects."""
     ranges = page_model(model).ranges
     lines = [
-        f"{name} [{unit}] = {model.parameters[name] * scale:.10g}"
-        if unit
-        else f"{name} = {model.parameters[name]:.10g}"
+        f"{_with_unit(name, unit)} = {model.parameters[name] * scale:.10g}"
         for name, (_, _, _, scale, unit) in ranges.items()
     ]
     return lines + [f"effect = {effect!r}" for effect in getattr(model, "effects", ())]

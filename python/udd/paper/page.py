@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from collections import Counter
 from collections.abc import Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING
 
+from udd._util.data_uri import data_uri
 from udd._util.html_templates import templates
 from udd._util.versions import versions
 
@@ -67,4 +67,4 @@ def render(
 
 def _embedded(drawn: Drawn) -> str:
     kind = "svg+xml" if drawn.figure.vector else "png"
-    return f"data:image/{kind};base64,{base64.b64encode(drawn.path.read_bytes()).decode()}"
+    return data_uri(f"image/{kind}", drawn.path.read_bytes())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import os
 import tempfile
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.data_uri import data_uri
 from udd.errors import UddError
 from udd.plot.frame_overlay import MARKS
 from udd.plot.style import AFTER, BEFORE, MEASURED
@@ -55,9 +55,9 @@ def side_by_side(discovery: Discovery, film: str | os.PathLike[str] | None) -> M
         panels = [Panel(p.title, p.colour, _within(p.seen, fit.model.parameters["R"])) for p in panels]
     start, seconds = float(times[0]), float(times[-1] - times[0])
     if film is None:
-        uri = _data("image/svg+xml", _svg(panels, fit.model, seconds * _SLOWER).encode())
+        uri = data_uri("image/svg+xml", _svg(panels, fit.model, seconds * _SLOWER).encode())
     else:
-        uri = _data("video/mp4", _mp4(panels, times, discovery.measurement, Path(film)))
+        uri = data_uri("video/mp4", _mp4(panels, times, discovery.measurement, Path(film)))
     titles = tuple(p.title for p in panels)
     alt = f"A moving picture, over and over: {', '.join(titles)}, side by side"
     return Movie(uri, alt, _PANEL * len(panels), titles, start, seconds, film is not None)
@@ -75,10 +75,6 @@ def _within(seen: Array, radius: float) -> Array:
     """A disk that has left the wheels stays where it left them."""
     gone = ~(np.hypot(seen[:, 0], seen[:, 1]) < 1.05 * radius)
     return seen[: int(np.argmax(gone))] if gone.any() and not gone[0] else seen
-
-
-def _data(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 # --- a drawing that moves

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from typing import TYPE_CHECKING
+
+import numpy as np
+
+from udd._util.data_uri import data_uri
 
 from .document import Image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 
 def blank(
@@ -61,5 +65,17 @@ def embedded(figure: Figure, kind: str, alt: str, dpi: int) -> Image:
     with mpl.rc_context({"svg.hashsalt": "udd"}):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
     mime = "image/svg+xml" if kind == "svg" else f"image/{kind}"
-    uri = f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode()}"
-    return Image(uri, alt, round(96 * figure.get_figwidth()))
+    return Image(data_uri(mime, buffer.getvalue()), alt, round(96 * figure.get_figwidth()))
+
+
+def photograph(frame: NDArray[np.uint8], alt: str, width: int) -> Image:
+    """Show a frame of a film (RGB) so many pixels wide, as a JPEG of at most twice as many."""
+    import cv2
+
+    factor = 2 * width / frame.shape[1]
+    if factor < 1:
+        frame = np.asarray(
+            cv2.resize(frame, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA), np.uint8
+        )
+    _, coded = cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
+    return Image(data_uri("image/jpeg", coded.tobytes()), alt, width)

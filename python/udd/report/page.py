@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import hashlib
 import io
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from udd._util.atomic_files import write_whole
+from udd._util.data_uri import data_uri
 from udd._util.html_templates import templates
 from udd._util.versions import version_of, versions
 from udd.errors import UddError
@@ -164,8 +164,7 @@ def _data(report: Report) -> list[tuple[str, str]]:
     for part in report.tables:
         text = io.StringIO()
         csv.writer(text).writerows(part.plain())
-        encoded = base64.b64encode(text.getvalue().encode()).decode()
-        made.append((plain(part.title), f"data:text/csv;charset=utf-8;base64,{encoded}"))
+        made.append((plain(part.title), data_uri("text/csv;charset=utf-8", text.getvalue().encode())))
     return made
 
 

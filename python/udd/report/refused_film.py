@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,12 +10,11 @@ import numpy as np
 
 from udd.errors import UddError
 
-from .document import Column, Figure, Gallery, Head, Image, Paragraph, Report, Section, Table, table
+from .document import Column, Figure, Gallery, Head, Paragraph, Report, Section, Table, table
+from .images import photograph
 from .page import identity, refuse_folder, write_page
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from udd.tracking.detection.survey import Survey
     from udd.tracking.options import TrackOptions
     from udd.video.reader import Film, Picture
@@ -150,22 +148,9 @@ def _frames(
                 cv2.putText(
                     image, str(number), (at[0] + radius, at[1]), 0, 0.45, (255, 0, 255), 1, cv2.LINE_AA
                 )
-        out.append(_figure(image, pictures[k]))
+        title = f"Frame {pictures[k].index}"
+        out.append(Figure(photograph(image, title, WIDTH), f"{title}, {pictures[k].t:.2f} s"))
     return tuple(out)
-
-
-def _figure(image: NDArray[np.uint8], picture: Picture) -> Figure:
-    import cv2
-
-    factor = 2 * WIDTH / image.shape[1]
-    if factor < 1:
-        image = np.asarray(
-            cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA), np.uint8
-        )
-    _, coded = cv2.imencode(".jpg", image[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
-    uri = f"data:image/jpeg;base64,{base64.b64encode(coded.tobytes()).decode()}"
-    title = f"Frame {picture.index}"
-    return Figure(Image(uri, title, WIDTH), f"{title}, {picture.t:.2f} s")
 
 
 def _facts(film: Film, look_over: Survey, pictures: list[Picture]) -> Table:

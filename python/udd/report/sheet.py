@@ -20,12 +20,11 @@ PAPERS = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "letter": (215.9, 279.4)}
 MARGIN = 8.0  # mm that printers leave white
 BELOW = 40.0  # mm for the text and the ruler
 RULER = 100.0  # mm
-REACH, SIDE = 65 / 80, 0.2  # of the radius: the marks' centres and their side
+SIDE = 0.2  # of the radius: the side of a mark
 TAG_REACH, TAG_SIDE = 0.62, 0.3
 DICTIONARY = "4x4_50"
 LEAST, MOST = 0.02, 0.5  # m: radii
 INCH = 25.4  # mm
-NAMES = ("red", "orange", "blue", "green")
 
 
 def write_sheet(
@@ -78,6 +77,8 @@ def write_sheet(
 
 def sheet_config(kind: str, radius: float) -> dict[str, Any]:
     """Return the tracker's options for a disk with the marks of a sheet, radius in m."""
+    from udd.tracking.calibration.scale import REACH
+
     if kind == "marks":
         return {"disk_radius": radius, "mark_distance": round(REACH * radius, 6)}
     reach, side = round(TAG_REACH * radius, 6), round(TAG_SIDE * radius, 6)
@@ -95,12 +96,17 @@ def _check(kind: str, radius: float, paper: str) -> None:
         raise UddError(f"paper must be one of {', '.join(PAPERS)}, not {paper!r}")
     if not (math.isfinite(radius) and LEAST <= radius <= MOST):
         raise UddError(f"radius must be from {LEAST:g} to {MOST:g} m, got {radius!r}: is it in m?")
-    width, height = PAPERS[paper]
-    room = min(width - 2 * MARGIN, height - BELOW - 2 * MARGIN) / 2
+    room = _largest(paper)
     if 1e3 * radius > room:
-        larger = [n for n, (w, h) in PAPERS.items() if 1e3 * radius <= min(w - 16, h - BELOW - 16) / 2]
+        larger = [other for other in PAPERS if 1e3 * radius <= _largest(other)]
         hint = f"say paper={larger[0]!r}" if larger else "print it in parts"
         raise UddError(f"a disk of radius {1e3 * radius:g} mm does not fit on {paper} ({room:g} mm): {hint}")
+
+
+def _largest(paper: str) -> float:
+    """Return the largest radius of a disk that fits on a paper [mm]."""
+    width, height = PAPERS[paper]
+    return min(width - 2 * MARGIN, height - BELOW - 2 * MARGIN) / 2
 
 
 def _drawn(kind: str, given: Mapping[str, Any], radius: float, paper: str) -> bytes:
@@ -140,13 +146,14 @@ def _drawn(kind: str, given: Mapping[str, Any], radius: float, paper: str) -> by
 def _marks(ax: Axes, middle: tuple[float, float], radius: float) -> None:
     from matplotlib.patches import Rectangle
 
-    from udd.markers.layout import NAMED
+    from udd.markers.layout import STANDARD
+    from udd.tracking.calibration.scale import REACH
 
     half = SIDE * radius / 2
-    for k, name in enumerate(NAMES):
-        u, v = REACH * radius * math.sin(k * math.pi / 2), REACH * radius * math.cos(k * math.pi / 2)
-        corner = (middle[0] + u - half, middle[1] + v - half)
-        colour = tuple(code / 255 for code in NAMED[name])
+    for place, codes in zip(STANDARD.places, STANDARD.colours, strict=True):  # down in a picture is positive
+        at = REACH * radius * place
+        corner = (middle[0] + at.real - half, middle[1] - at.imag - half)
+        colour = tuple(code / 255 for code in codes)
         ax.add_patch(Rectangle(corner, 2 * half, 2 * half, facecolor=colour, edgecolor="none"))
 
 

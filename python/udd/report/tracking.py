@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import os
 from collections import Counter
@@ -32,7 +31,7 @@ from .document import (
     parts,
     table,
 )
-from .images import blank, png
+from .images import blank, photograph, png
 from .page import identity, refuse_folder, write_page
 
 if TYPE_CHECKING:
@@ -264,8 +263,6 @@ def chosen(m: Measurement) -> list[tuple[int, str]]:
 
 def frames(video: str | os.PathLike[str], m: Measurement) -> tuple[Figure, ...]:
     """Draw the measured positions on the chosen frames."""
-    import cv2
-
     from udd.tracking import pictures_at, pixels
     from udd.tracking.overlay import draw
 
@@ -274,12 +271,7 @@ def frames(video: str | os.PathLike[str], m: Measurement) -> tuple[Figure, ...]:
     for image, (k, why) in zip(pictures_at(video, [k for k, _ in pick], m), pick, strict=True):
         drawn = np.ascontiguousarray(image)
         draw(drawn, where, k, "")
-        factor = WIDTH * 2 / drawn.shape[1]
-        if factor < 1:
-            drawn = np.asarray(cv2.resize(drawn, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA))
-        _, coded = cv2.imencode(".jpg", drawn[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
-        uri = f"data:image/jpeg;base64,{base64.b64encode(coded.tobytes()).decode()}"
-        out.append(Figure(Image(uri, f"Frame {k}, {why}", WIDTH), f"{m.t[k]:.2f} s: {why}"))
+        out.append(Figure(photograph(drawn, f"Frame {k}, {why}", WIDTH), f"{m.t[k]:.2f} s: {why}"))
     return tuple(out)
 
 
