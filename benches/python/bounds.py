@@ -167,7 +167,7 @@ def homoclinic_orbits() -> list[float]:
 
 
 def connections_of_closed_form() -> list[float]:
-    """Of energies H: the rate H' = y^2 (b - c + k (H - H1)) keeps H = H1, an orbit of saddles, at b = c."""
+    """The rate H' = y^2 (b - c + k (H - H1)) of the energy H keeps H = H1, an orbit of saddles, at b = c."""
     found = []
     for c, k in ((0.3, -1.0), (0.7, -0.5)):
         for kind, pull, energy, start in (

@@ -23,7 +23,7 @@ _AHEAD = 1e-6  # scaled difference for derivatives of the conditions at the ends
 _FARTHEST = 0.3  # Newton step at most, in scaled unknowns
 _PATIENCE = 40  # Newton steps at most
 _COLLAPSED = 0.1  # of the guess: a smaller orbit has collapsed to its equilibrium
-_CUT = 5e-3  # of the orbit's extent from the equilibrium, where the orbit is cut before it is prolonged anew
+_CUT = 5e-3  # share of the orbit's extent at which the orbit is cut before it is prolonged
 
 
 @dataclass(frozen=True, eq=False)

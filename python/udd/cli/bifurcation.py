@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
         "--path",
         choices=("independent", "up", "down", "both"),
         default="independent",
-        help="start each value at the end of the run before it (up, down), or anew (default independent)",
+        help="start each value at the end of the run before it (up, down), or independently (the default)",
     )
     add_runs(parser, 200)
     parser.add_argument(

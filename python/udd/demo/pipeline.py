@@ -17,7 +17,7 @@ from udd.tracking import track
 #: Known to the user of the device: the speed of the wheels [m/s], and the radius of the disk [m].
 W = 0.042
 R = 0.08
-#: Stands in the header of the measured table, on the page and in the report.
+#: Origin of the film, for the header of the measured table, the page and the report.
 ORIGIN = "This film was rendered from a simulated disk, not filmed."
 
 
