@@ -20,8 +20,8 @@ KEPT = {
     "page.found",
     "track.more",
 }
-#: Packages whose names are not renamed yet. A package leaves this list and never enters it.
-PENDING = {"app", "bifurcations", "cli", "plot", "report"}
+#: The package whose names are not renamed yet.
+PENDING = {"bifurcations"}
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef
 Node = ast.AST
 

@@ -72,16 +72,16 @@ def grown(start: Start, count: int) -> Grown:
     """Run over `count` states and return the first half of them."""
     model = start.model
     run = integrated(model, times_of(model, count), start.state)
-    told = count // 2
+    kept_count = count // 2
     most = int(limits.MODEL_SECONDS * RATE)
     outcome = "running"
-    if run.outcome != "finished" and len(run.t) <= told:
-        outcome, told = run.outcome, len(run.t)
-    elif told >= most:
-        outcome, told = "full", most
+    if run.outcome != "finished" and len(run.t) <= kept_count:
+        outcome, kept_count = run.outcome, len(run.t)
+    elif kept_count >= most:
+        outcome, kept_count = "full", most
     books = energy_balance(run)
     steps = run.stats.accepted + run.stats.rejected
-    return Grown(run.t[:told], _table(run, books, told), outcome, float(books.motor[0]), steps)
+    return Grown(run.t[:kept_count], _table(run, books, kept_count), outcome, float(books.motor[0]), steps)
 
 
 class Run:
@@ -117,14 +117,15 @@ class Run:
             return 0
         return 2 * self._asked if self._asked else int(_FIRST * RATE)
 
-    def take(self, count: int, more: Grown) -> None:
-        """Take over what a call over `count` states gave."""
+    def take(self, count: int, grown_run: Grown) -> None:
+        """Take over the states that a call over `count` states gave."""
         before, dim = len(self.rows), len(self.start.state)
-        if before and not np.array_equal(more.rows[:before, :dim], self.rows[:, :dim]):
+        if before and not np.array_equal(grown_run.rows[:before, :dim], self.rows[:, :dim]):
             raise AssertionError("a longer run did not repeat a shorter one")
         self._asked = count
-        self.t, self.rows, self.outcome, self.motor = more.t, more.rows, more.outcome, more.motor
-        if self.outcome == "running" and 2 * more.steps > limits.STEPS:
+        self.t, self.rows = grown_run.t, grown_run.rows
+        self.outcome, self.motor = grown_run.outcome, grown_run.motor
+        if self.outcome == "running" and 2 * grown_run.steps > limits.STEPS:
             self.outcome = "spent"
 
     def end(self, refusal: UddError) -> None:

@@ -33,21 +33,21 @@ def _worker_threads() -> int:
 
 def section(start: Start, surface: str, count: int) -> tuple[Array, str]:
     """Crossings of a surface, shape (n, dim), and how the orbit ended."""
-    known = page_model(start.model).surfaces
-    if surface not in known:
-        raise ModelError(f"no section is called {surface!r}; there are {', '.join(known)}")
+    surfaces = page_model(start.model).surfaces
+    if surface not in surfaces:
+        raise ModelError(f"no section is called {surface!r}; there are {', '.join(surfaces)}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the outcome says it
-        found = poincare(
+        crossings = poincare(
             beyond_the_edge(start.model),
-            known[surface][0],
+            surfaces[surface][0],
             min(count, limits.POINTS),
             state0=list(start.state),
             transient=_TRANSIENT,
             threads=_worker_threads(),
             progress=False,
         )
-    return np.ascontiguousarray(found.state), str(found.outcome)
+    return np.ascontiguousarray(crossings.state), str(crossings.outcome)
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def exponents(start: Start, low: float, high: float, count: int) -> Exponents:
 def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what has no verdict has label 0
-        found = bifurcation(
+        attractors = bifurcation(
             model,
             name,
             values,
@@ -105,8 +105,8 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
             threads=_worker_threads(),
             progress=False,
         )
-    points = np.stack([found[state].values[0] for state in model.state_names], axis=-1)
-    label, period = (found[key].values[0].astype(float) for key in ("attractor", "period"))
+    points = np.stack([attractors[state].values[0] for state in model.state_names], axis=-1)
+    label, period = (attractors[key].values[0].astype(float) for key in ("attractor", "period"))
     return Diagram(values, label, period, np.ascontiguousarray(points))
 
 

@@ -14,12 +14,12 @@ from udd.report.document import text_of
 from .spec import model_of
 
 
-def of(found: Any) -> dict[str, Any]:
+def of(discovery: Any) -> dict[str, Any]:
     """Return the top of the result: the verdict and its numbers."""
-    numbers = wording.headline(found)
+    numbers = wording.headline(discovery)
     return {
-        "verdict": found.verdict,
-        "sentence": wording.verdict(found),
+        "verdict": discovery.verdict,
+        "sentence": wording.verdict(discovery),
         "effects": [
             {
                 "title": e.title,
@@ -27,21 +27,21 @@ def of(found: Any) -> dict[str, Any]:
                 "values": _values(e),
                 "p": e.p,
             }
-            for e in found.effects
+            for e in discovery.effects
         ],
-        "limits": [text_of(text) for text in wording.short_limits(found)],
+        "limits": [text_of(text) for text in wording.short_limits(discovery)],
         "before": numbers.before,
-        "after": numbers.after if found.effects else None,
+        "after": numbers.after if discovery.effects else None,
         "floor": numbers.floor,
         "span": numbers.span,
-        "ratio": numbers.ratio if found.effects else None,
-        "interval": numbers.interval if found.effects else None,
-        "errors": [{key: text_of(text) for key, text in row.items()} for row in tables.errors(found)],
+        "ratio": numbers.ratio if discovery.effects else None,
+        "interval": numbers.interval if discovery.effects else None,
+        "errors": [{key: text_of(text) for key, text in row.items()} for row in tables.errors(discovery)],
         "evidence": [
             {"title": s.candidate.title, "chi2": s.chi2 if math.isfinite(s.chi2) else None}
-            for s in (found.scans[0][:8] if found.scans else [])
+            for s in (discovery.scans[0][:8] if discovery.scans else [])
         ],
-        "explore": _explore(found),
+        "explore": _explore(discovery),
     }
 
 
@@ -57,9 +57,9 @@ def _values(effect: Any) -> list[str]:
     ]
 
 
-def _explore(found: Any) -> dict[str, Any] | None:
+def _explore(discovery: Any) -> dict[str, Any] | None:
     """The fitted model and its first state, to run on the page; None for what the page does not show."""
-    model = found.fit.models[0]
+    model = discovery.fit.models[0]
     if not isinstance(model, Disk) or any(e.made is not None for e in model.effects):
         return None
     written = model_to_dict(model)
@@ -67,4 +67,4 @@ def _explore(found: Any) -> dict[str, Any] | None:
         model_of(written)
     except ModelError:  # a fitted value outside its physical range
         return None
-    return {"model": written, "state": found.fit.states[0].tolist()}
+    return {"model": written, "state": discovery.fit.states[0].tolist()}

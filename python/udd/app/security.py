@@ -55,7 +55,7 @@ class Guard:
         """Why a request is refused, in a sentence."""
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
-        if len(hosts) != 1 or not self._known(hosts[0]):
+        if len(hosts) != 1 or not self._is_own_host(hosts[0]):
             return "This server answers only to the address that udd app printed."
         origin = headers.get("origin")
         if origin is None:
@@ -72,7 +72,7 @@ class Guard:
             return "The token is missing or wrong: open the link that udd app printed."
         return None
 
-    def _known(self, host: str) -> bool:
+    def _is_own_host(self, host: str) -> bool:
         if host.lower() in self._hosts:
             return True
         if not self._any_address:

@@ -177,7 +177,7 @@ def new_token() -> str:
 
 async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
     """Return the question to a job; its file is put into its folder."""
-    known = {name: value for name in ("W", "R", "length") if (value := _number(request, name)) is not None}
+    given = {name: value for name in ("W", "R", "length") if (value := _number(request, name)) is not None}
     if kind == "film":
         declared = request.headers.get("content-length", "0")
         if declared.isdigit() and int(declared) > limits.UPLOAD:
@@ -185,7 +185,7 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
         file = await uploads.receive(request.stream(), folder)
         chosen = parsed("the columns", request.query_params.get("columns") or "[]")
         film = file.suffix == ".film"
-        return {"kind": "loop", "file": file.name, "film": film, "columns": chosen, **known}
+        return {"kind": "loop", "file": file.name, "film": film, "columns": chosen, **given}
     if kind == "sample":
         from udd.demo import pipeline
 

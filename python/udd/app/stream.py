@@ -44,13 +44,13 @@ class Page:
     async def serve(self) -> None:
         """Answer until the page is gone; what it asked for ends with it."""
         await self._socket.accept()
-        both = [asyncio.create_task(self._reading()), asyncio.create_task(self._sending())]
+        loops = [asyncio.create_task(self._reading()), asyncio.create_task(self._sending())]
         try:
-            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(loops, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for job in self._jobs.jobs.values():
                 job.watchers.discard(self.post)
-            tasks = [*both, *self._open]
+            tasks = [*loops, *self._open]
             for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
@@ -84,16 +84,16 @@ class Page:
                 raise UddError("the message is too long")
             said = message_of(text)
             kind = str(said.get("type"))
-            known: dict[str, Callable[[dict[str, Any]], Any]] = {
+            handlers: dict[str, Callable[[dict[str, Any]], Any]] = {
                 "run": self._run,
                 "section": self._section,
                 "diagram": self._diagram,
                 "watch": self._watch,
                 "cancel": self._cancel,
             }
-            if kind not in known:
+            if kind not in handlers:
                 raise UddError(f"no message is called {kind!r}")
-            await known[kind](said)
+            await handlers[kind](said)
         except (UddError, OverflowError) as error:
             await self._out.put(_refused(said, error))
 

@@ -92,7 +92,7 @@ def _base(role: str) -> str:
     return COUNTED.get(role, "rad/s")
 
 
-def measurement_of(path: Path, choices: Sequence[Any], known: dict[str, Any]) -> Measurement:
+def measurement_of(path: Path, choices: Sequence[Any], constants: dict[str, Any]) -> Measurement:
     """Read a table with the columns that were chosen, ``[role, heading, unit]`` each; none: as it stands.
 
     Raises
@@ -102,11 +102,11 @@ def measurement_of(path: Path, choices: Sequence[Any], known: dict[str, Any]) ->
     """
     if not choices:
         try:
-            return read_measurement(path, **known)
+            return read_measurement(path, **constants)
         except UddError:
             if not holds_rates_alone(path):
                 raise
-            return read_gyroscope(path, **known)
+            return read_gyroscope(path, **constants)
     columns: dict[str, str] = {}
     units: dict[str, str] = {}
     for choice in choices:
@@ -121,18 +121,18 @@ def measurement_of(path: Path, choices: Sequence[Any], known: dict[str, Any]) ->
     made = set(columns) - {"t"}
     if made not in ({"theta"}, {"Omega"}, {"Y", "Z", "beta"}):
         raise UddError("choose t with theta, t with Omega, or t with Y, Z and beta")
-    found = read_measurement(path, columns, **known)
+    measurement = read_measurement(path, columns, **constants)
     stated = {h.raw: h.unit for table in tables_of(path) for h in table.headings}
     factors = {role: _factor(role, units[role], stated.get(columns[role], "")) for role in columns}
-    values = found.values * [factors[name] for name in found.names]
-    return replace(found, t=found.t * factors.get("t", 1.0), values=values)
+    values = measurement.values * [factors[name] for name in measurement.names]
+    return replace(measurement, t=measurement.t * factors.get("t", 1.0), values=values)
 
 
 def _factor(role: str, unit: str, stated: str) -> float:
     """By what values are multiplied that were read by the unit that the heading states."""
-    known = UNITS[_base(role)]
+    factors = UNITS[_base(role)]
     if not unit or unit == stated:
         return 1.0
-    if unit not in known:
+    if unit not in factors:
         raise MeasurementError(f"{unit} is no unit of {role}")
-    return known[unit] / known.get(stated, 1.0)
+    return factors[unit] / factors.get(stated, 1.0)

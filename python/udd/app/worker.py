@@ -83,13 +83,14 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     from .table_columns import measurement_of
 
-    file, known = Path(asked["file"]), {k: asked[k] for k in ("W", "R", "origin") if asked.get(k) is not None}
+    file = Path(asked["file"])
+    constants = {k: asked[k] for k in ("W", "R", "origin") if asked.get(k) is not None}
     film = asked["film"]
     tell({"say": "reading the film" if film else "reading the table"})
     if film:
-        measurement = _tracked(file, known.get("R", 0.08), tell, "W" in known).with_meta(**known)
+        measurement = _tracked(file, constants.get("R", 0.08), tell, "W" in constants).with_meta(**constants)
     else:
-        measurement = measurement_of(file, asked.get("columns") or [], known)
+        measurement = measurement_of(file, asked.get("columns") or [], constants)
     measurement.to_csv(OUT / "measurement.csv")
     if measurement.kind == "pendulum" or measurement.names == ("Omega",):
         length = asked.get("length") or measurement.meta.get("length")
@@ -102,13 +103,13 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
         if W is None:
             raise UddError(_NO_DRIVE)
         model = Disk(float(W), R=float(R))
-    found = discover(measurement, model, progress=lambda text: tell({"say": text}))
+    discovery = discover(measurement, model, progress=lambda text: tell({"say": text}))
     tell({"say": "drawing the report"})
-    report = found.report(OUT / "report.html", film=file if film else None, source=file)
-    (OUT / "discovery.json").write_text(as_json(found.to_dict()), encoding="utf-8")
+    report = discovery.report(OUT / "report.html", film=file if film else None, source=file)
+    (OUT / "discovery.json").write_text(as_json(discovery.to_dict()), encoding="utf-8")
     from . import report_parts, result
 
-    return {**result.of(found), "parts": report_parts.save_parts(report, OUT)}
+    return {**result.of(discovery), "parts": report_parts.save_parts(report, OUT)}
 
 
 def _tracked(file: Path, radius: float, tell: Tell, drive: bool = True) -> Any:

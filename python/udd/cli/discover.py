@@ -70,17 +70,17 @@ def run(args: argparse.Namespace) -> CommandResult:
             "matplotlib.figure", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_agg"
         )
     with status_line() as tell:
-        found = discover(
+        discovery = discover(
             *given.measured, held_out=held_out, budget=args.budget, progress=tell, **options(args)
         )
         if args.report is not None:
             tell("writing the report")
             command = shlex.join(["udd", *sys.argv[1:]])
             # The page shows the first record that was fitted.
-            shown = next(k for k in range(len(given.files)) if k not in found.held_out)
-            found.report(args.report, film=given.films[shown], source=given.files[shown], command=command)
-    text, data = as_text(summary_of(found)), {**given.told, **found.to_dict()}
-    data["hints"] = [hint.to_dict() for hint in found.hints]
+            shown = next(k for k in range(len(given.files)) if k not in discovery.held_out)
+            discovery.report(args.report, film=given.films[shown], source=given.files[shown], command=command)
+    text, data = as_text(summary_of(discovery)), {**given.file_entry, **discovery.to_dict()}
+    data["hints"] = [hint.to_dict() for hint in discovery.hints]
     if args.report is not None:
         text += f"\nreport: {args.report}"
         data["report"] = args.report

@@ -40,10 +40,10 @@ def run(args: argparse.Namespace) -> CommandResult:
         tell("fitting")
         fitted = fit(*given.measured, **options(args))
     if not args.uncertainties:
-        return CommandResult(str(fitted), {**given.told, **fitted.to_dict()})
+        return CommandResult(str(fitted), {**given.file_entry, **fitted.to_dict()})
     tables = fitted.budget()
     text = f"{fitted}\n\nexpanded uncertainties, and shares of the variance:\n{tables}"
-    return CommandResult(text, {**given.told, **fitted.to_dict(), **tables.to_dict()})
+    return CommandResult(text, {**given.file_entry, **fitted.to_dict(), **tables.to_dict()})
 
 
 def options(args: argparse.Namespace) -> dict[str, Any]:

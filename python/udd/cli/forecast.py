@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     for path in args.out:
         _write(path, prediction)
     text = "\n".join([describe(prediction), *(f"written: {path}" for path in args.out)])
-    return CommandResult(text, {**given.told, **prediction.to_dict(), "files": args.out})
+    return CommandResult(text, {**given.file_entry, **prediction.to_dict(), "files": args.out})
 
 
 def describe(prediction: Forecast) -> str:

@@ -154,7 +154,7 @@ class Inputs:
         return self.measurements, self.models
 
     @property
-    def told(self) -> dict[str, Any]:
+    def file_entry(self) -> dict[str, Any]:
         """The files in the output of `--json`."""
         return {"file": self.files[0] if len(self.files) == 1 else self.files}
 
@@ -177,7 +177,7 @@ def _each(args: argparse.Namespace) -> list[argparse.Namespace]:
 
 def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     """The measurement in a file, and the film if it is one."""
-    known = {"W": args.W, "R": args.R}
+    constants = {"W": args.W, "R": args.R}
     if not is_film(args.file):
         from udd.measurement import read_measurement
         from udd.measurement.read import column_sentence, columns_of
@@ -210,7 +210,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
                 repeated=args.repeated,
                 part=args.part,
                 **limit,
-                **known,
+                **constants,
             )
         if said := column_sentence(measurement.meta.get("columns")):
             print(f"udd: {args.file}: {said}", file=sys.stderr)
@@ -223,7 +223,7 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
 
     radius = 0.08 if args.R is None else args.R
     found = whole(args, lambda: track(args.file, disk_radius=radius, progress=shown_progress()))
-    return found.with_meta(**{key: value for key, value in known.items() if value is not None}), args.file
+    return found.with_meta(**{key: value for key, value in constants.items() if value is not None}), args.file
 
 
 def _is_gyroscope(args: argparse.Namespace, limit: dict[str, float]) -> bool:
@@ -254,9 +254,9 @@ def add_partial(parser: argparse.ArgumentParser) -> None:
 def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measurement:
     """Measure a film; refuse a truncated one without `--partial`."""
     with warnings.catch_warnings(record=True) as said:
-        found = measure()
-    missing = int(found.meta.get("frames_missing", 0))
-    promised = missing + len(found)
+        measurement = measure()
+    missing = int(measurement.meta.get("frames_missing", 0))
+    promised = missing + len(measurement)
     if missing > _CUT * promised and not args.partial:
         raise UddError(
             f"{args.file} is cut off: {missing} of its {promised} frames are missing "
@@ -264,7 +264,7 @@ def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measu
         )
     for warning in said:
         warnings.warn(warning.message, stacklevel=2)
-    return found
+    return measurement
 
 
 def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
@@ -287,13 +287,13 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
             f"{args.file}: the {columns} no pendulum's (theta) and no disk's (Y, Z, beta): use --model"
         )
     refuse_others(args, "disk", f"{args.file} is a disk's record: ")
-    W = _known(args, measurement, "W")
+    W = _option_or_header(args, measurement, "W")
     if W is None:
         raise UddError(
             f"the drive speed is in neither the command line nor the header of {args.file}: "
             "say --W in m/s (--W 0 where the wheels stand still)"
         )
-    R = _known(args, measurement, "R")
+    R = _option_or_header(args, measurement, "R")
     return disk(args, W, 0.08 if R is None else R)
 
 
@@ -319,7 +319,7 @@ def own_model(args: argparse.Namespace) -> FormulaModel:
     from udd.models.serialization import formula_model_from_dict
 
     refuse_others(args, "own")
-    data = _own(args)
+    data = _model_file(args)
     data.pop("state0", None)
     model = formula_model_from_dict(data)
     if "mechanism" not in data:
@@ -329,10 +329,10 @@ def own_model(args: argparse.Namespace) -> FormulaModel:
 
 def start_of(args: argparse.Namespace) -> Any:
     """Where hidden states start, as the file of the user's own model says; None where it does not."""
-    return None if args.model is None else _own(args).get("state0")
+    return None if args.model is None else _model_file(args).get("state0")
 
 
-def _own(args: argparse.Namespace) -> dict[str, Any]:
+def _model_file(args: argparse.Namespace) -> dict[str, Any]:
     """Read the file of `--model`."""
     from udd._util.tables import read, table
 
@@ -340,7 +340,7 @@ def _own(args: argparse.Namespace) -> dict[str, Any]:
     return table(str(args.model), read(args.model, toml=toml), error=UddError)
 
 
-def _known(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
+def _option_or_header(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
     value: float | None = getattr(args, name)
     return _number(args, measurement, name) if value is None else value
 

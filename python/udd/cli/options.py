@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def new(
-    commands: Any, name: str, run: Any, summary: str, examples: tuple[str, ...] = (), more: str = ""
+    commands: Any, name: str, run: Any, summary: str, examples: tuple[str, ...] = (), notes: str = ""
 ) -> argparse.ArgumentParser:
-    """A command with what all have; `examples` end its help, after `more`."""
+    """Add a command with the common options; `examples` end its help, after `notes`."""
     shown = "\n".join(["examples:", *(f"  {one}" for one in examples)])
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         description=summary,
-        epilog=f"{more}\n{shown}" if more else shown,
+        epilog=f"{notes}\n{shown}" if notes else shown,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.summary = summary  # type: ignore[attr-defined]

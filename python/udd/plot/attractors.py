@@ -167,17 +167,17 @@ def _ends(result: xr.Dataset, titles: list[str]) -> xr.DataArray:
 
 def shown_component(result: xr.Dataset, component: str | None) -> str:
     """The component that is drawn: the one asked for, or the first that varies."""
-    own = [str(name) for name, array in result.data_vars.items() if "point" in array.dims]
+    components = [str(name) for name, array in result.data_vars.items() if "point" in array.dims]
     if component is not None:
-        if component not in own:
-            raise UddError(f"this diagram has no {component!r}; it has {', '.join(own)}")
+        if component not in components:
+            raise UddError(f"this diagram has no {component!r}; it has {', '.join(components)}")
         return component
-    for name in own:
+    for name in components:
         values = result[name].to_numpy()
         seen = values[np.isfinite(values)]
         if seen.size and np.ptp(seen) > 1e-9:
             return name
-    return own[0]
+    return components[0]
 
 
 def _axis(result: xr.Dataset, name: str) -> tuple[str, str, float]:

@@ -34,7 +34,7 @@ _MARKS = {
     "border collision": ("x", "#999999"),
 }
 _OPEN = 400  # lines that a piece may belong to
-_NEAR = 0.12  # crossings of neighbouring cycles are joined within this part of the picture's height
+_LARGEST_GAP = 0.12  # crossings of neighbouring cycles are joined within this part of the picture's height
 
 
 @checked_arguments(error=UddError)
@@ -182,20 +182,20 @@ def _draw(ax: Axes, branch: Branch, rows: Rows) -> None:
     from matplotlib.collections import LineCollection
 
     every = np.concatenate([part for row in rows for part in row] or [np.zeros(1)])
-    near = _NEAR * float(np.ptp(every)) if every.size else 0.0
+    largest_gap = _LARGEST_GAP * float(np.ptp(every)) if every.size else 0.0
     # Between two places; at a bifurcation itself rounding would decide.
     turning = np.isin(branch.arclength, [point.arclength for point in branch.points])
-    held = np.where(turning[:-1], branch.stable[1:], branch.stable[:-1])
+    stable_between = np.where(turning[:-1], branch.stable[1:], branch.stable[:-1])
     for stable, shade, style, width in ((True, _STABLE, "-", 1.6), (False, _UNSTABLE, (0, (4, 2)), 0.9)):
         lines: list[list[tuple[float, float]]] = []
-        for i in np.flatnonzero(held == stable):
+        for i in np.flatnonzero(stable_between == stable):
             for here, there in zip(rows[i], rows[i + 1], strict=True):
                 if not len(there):
                     continue
                 same = len(here) == len(there)
                 others = there if same else [there[np.argmin(np.abs(there - a))] for a in here]
                 for a, b in zip(here, others, strict=True):
-                    if abs(a - b) <= near or near == 0.0:
+                    if abs(a - b) <= largest_gap or largest_gap == 0.0:
                         _join(lines, (branch.values[i], a), (branch.values[i + 1], b))
         if not lines:
             continue

@@ -72,14 +72,14 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
         label="95 % band",
     )
     ax.plot(across * x, value, color=AFTER, linewidth=2, label="the curve")
-    for one, colour in zip(formulas, _COLOURS, strict=False):
+    for formula, colour in zip(formulas, _COLOURS, strict=False):
         ax.plot(
             across * x,
-            up * curve.aligned_with(one.values(x), x),
+            up * curve.aligned_with(formula.values(x), x),
             "--",
             color=colour,
             linewidth=1.4,
-            label=one.text,
+            label=formula.text,
         )
     ax.axhline(0, color="black", linewidth=0.8)
     shown = np.quantile(places, np.linspace(0.002, 0.998, 200))
@@ -123,7 +123,7 @@ def _surface(curve: Any, ax: Axes) -> Axes:
     from matplotlib.patches import Patch
     from matplotlib.ticker import MaxNLocator
 
-    (one, x), (other, y) = (_range(curve, k, _ACROSS) for k in (0, 1))
+    (first_visited, x), (second_visited, y) = (_range(curve, k, _ACROSS) for k in (0, 1))
     (first, by), (second, times) = (_axis(c.name) for c in curve.coordinates)
     said, up = _value(curve)
     grid = np.meshgrid(x, y, indexing="ij")
@@ -133,7 +133,7 @@ def _surface(curve: Any, ax: Axes) -> Axes:
     shown = ax.contourf(by * grid[0], times * grid[1], value, levels, cmap="RdBu_r")
     doubtful = np.abs(value) < 1.96 * error
     ax.contourf(by * grid[0], times * grid[1], doubtful, [0.5, 1.5], colors="none", hatches=["///"])
-    ax.plot(by * one, times * other, ".", color=MEASURED, markersize=1.5, alpha=0.4)
+    ax.plot(by * first_visited, times * second_visited, ".", color=MEASURED, markersize=1.5, alpha=0.4)
     ax.figure.colorbar(shown, ax=ax, label=said)
     unsure = Patch(facecolor="none", edgecolor="black", hatch="///", label="0 lies in the 95 % band")
     been = Line2D([], [], color=MEASURED, linestyle="", marker=".", markersize=4, label="the record")

@@ -106,16 +106,18 @@ def _of_sweep(result: Any) -> tuple[str, Array, Array, Array, str]:
 def _of_spectra(result: Any) -> tuple[str, Array, Array, Array, str]:
     """The same of several spectra."""
     given = list(result) if isinstance(result, Sequence) else [result]
-    if not given or not all(isinstance(one, Spectrum) for one in given):
+    if not given or not all(isinstance(spectrum, Spectrum) for spectrum in given):
         raise UddError("exponents need values and exponents, spectra of udd.lyapunov_spectrum, or a sweep")
-    settings = [one.model.parameters for one in given]
+    settings = [spectrum.model.parameters for spectrum in given]
     first = settings[0]
     varied = [name for name in first if any(other.get(name) != first[name] for other in settings)]
     if len(varied) != 1:
         raise UddError(f"the spectra must differ in one parameter, not in {', '.join(varied) or 'none'}")
     unit = given[0].model.units[varied[0]]
     x = np.array([other[varied[0]] for other in settings])
-    y, sd = (np.array([getattr(one, name) for one in given]) for name in ("exponents", "standard_errors"))
+    y, sd = (
+        np.array([getattr(spectrum, name) for spectrum in given]) for name in ("exponents", "standard_errors")
+    )
     return f"{varied[0]} [{unit or '1'}]", x, y, sd, given[0].model.profile.dynamics.rate_unit
 
 

@@ -173,15 +173,15 @@ def coordinates(fit: Any) -> dict[str, Array]:
 def clearest(fit: Any, equation: str | None = None, against: str | None = None) -> tuple[str, str]:
     """The equation and the coordinate between which the residual shows the clearest pattern."""
     names = fit.model.state_names
-    best, found = -1.0, (names[0], "t")
+    best, panel = -1.0, (names[0], "t")
     for name in [equation] if equation else names:
         for place, x in coordinates(fit).items():
             if place != against and (against is not None or place == "t"):
                 continue  # along time, whatever changes slowly looks like a pattern
             share = pattern(x, fit.defect[:, names.index(name)])
             if share > best:
-                best, found = share, (name, place)
-    return found
+                best, panel = share, (name, place)
+    return panel
 
 
 def pattern(x: Array, y: Array) -> float:

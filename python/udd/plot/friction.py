@@ -85,9 +85,9 @@ def coefficient(model: Any, omega: Array) -> Array:
 def _error(fit: Any, omega: Array) -> Array:
     """Standard error of k from the parameters' covariance, to first order."""
     names = list(fit.parameters)
-    own = [n for n in names if n in fit.model.parameters]
+    friction_names = [n for n in names if n in fit.model.parameters]
     slopes = []
-    for name in own:
+    for name in friction_names:
         step = 0.1 * fit.errors[name]
         if not (np.isfinite(step) and step > 0):
             slopes.append(np.zeros(len(omega)))
@@ -102,7 +102,7 @@ def _error(fit: Any, omega: Array) -> Array:
         (a, ka), (b, kb) = sides
         slopes.append((kb - ka) / (b - a) if b > a else np.zeros(len(omega)))
     jacobian = np.array(slopes).T if slopes else np.zeros((len(omega), 0))
-    pick = [names.index(n) for n in own]
+    pick = [names.index(n) for n in friction_names]
     block = fit.covariance[np.ix_(pick, pick)]
     result: Array = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", jacobian, block, jacobian), 0.0))
     return result

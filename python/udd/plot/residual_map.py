@@ -57,7 +57,7 @@ def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axe
     cells = [_cells(one) for one, _ in shown]
     ax = new_axes(ax, size=(1.5 * len(columns) + 1.5, 0.95 * len(rows) + 0.8))
     for r, equation in enumerate(rows):
-        top = max(float(np.max(np.abs(m) + 2 * s)) for found in cells for _, m, s in found[r])
+        top = max(float(np.max(np.abs(m) + 2 * s)) for grid in cells for _, m, s in grid[r])
         words, unit, factor = EQUATIONS[equation]
         place = len(rows) - 1 - r
         ax.text(-0.03, place + 0.62, words, ha="right", va="center", fontsize="medium")
@@ -66,10 +66,10 @@ def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axe
         )
         for c in range(len(columns)):
             # All fits of a cell share its axes.
-            low = min(float(found[r][c][0].min()) for found in cells)
-            high = max(float(found[r][c][0].max()) for found in cells)
-            for found, (_, colour) in zip(cells, shown, strict=True):
-                centre, mean, error = found[r][c]
+            low = min(float(grid[r][c][0].min()) for grid in cells)
+            high = max(float(grid[r][c][0].max()) for grid in cells)
+            for grid, (_, colour) in zip(cells, shown, strict=True):
+                centre, mean, error = grid[r][c]
                 x = c + 0.04 + 0.92 * (centre - low) / max(high - low, 1e-300)
                 y, e = place + 0.5 + 0.44 * mean / top, 0.88 * error / top
                 band = np.column_stack([np.r_[x, x[::-1]], np.r_[y - e, (y + e)[::-1]]])

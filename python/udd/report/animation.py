@@ -48,7 +48,10 @@ def side_by_side(discovery: Discovery, film: str | os.PathLike[str] | None) -> M
     """Measured and modelled motion from the first held-out frame on: the film itself where there is one."""
     fit = discovery.fit
     times, measured, modelled = runs.side_by_side(discovery, fit.model.profile.shown.movie)
-    panels = [Panel("measured", MEASURED, _held(measured)), Panel("the known model", BEFORE, modelled[0])]
+    panels = [
+        Panel("measured", MEASURED, _with_gaps_filled(measured)),
+        Panel("the known model", BEFORE, modelled[0]),
+    ]
     if len(modelled) > 1:
         panels.append(Panel("with the added effect", AFTER, modelled[1]))
     if fit.model.profile.shown.contact:
@@ -63,7 +66,7 @@ def side_by_side(discovery: Discovery, film: str | os.PathLike[str] | None) -> M
     return Movie(uri, alt, _PANEL * len(panels), titles, start, seconds, film is not None)
 
 
-def _held(seen: Array) -> Array:
+def _with_gaps_filled(seen: Array) -> Array:
     """Frames that did not show it show what the one before showed."""
     result = seen.copy()
     there = np.isfinite(seen).all(axis=1)

@@ -83,13 +83,13 @@ def disk_head(discovery: Discovery) -> Head:
     return head(discovery, f"Effects that the model of the {thing} lacks", said)
 
 
-def _formula(found: AddedEffect, discovery: Discovery) -> Markup:
-    effect = found.effect
+def _formula(added: AddedEffect, discovery: Discovery) -> Markup:
+    effect = added.effect
     changed = [pretty(equation) + Markup(", &ensp;") for equation in wording.enters(effect)]
     values = Markup("")
     if not wording.is_spline(effect):
-        values = Markup(" &ensp;with ") + wording.values_of(found, discovery.fit.model.units)
-    return Markup("").join(changed) + pretty(found.equation) + values
+        values = Markup(" &ensp;with ") + wording.values_of(added, discovery.fit.model.units)
+    return Markup("").join(changed) + pretty(added.equation) + values
 
 
 def sections(
@@ -97,17 +97,23 @@ def sections(
 ) -> tuple[Section, ...]:
     """Build the sections on motion, errors, residuals, candidates, limits and numbers."""
     # If several films were fitted together, the first one is shown.
-    one = replace(discovery, baseline=first_film(discovery.baseline), fit=first_film(discovery.fit))
-    made = [_measured(discovery, one, film), _errors(discovery), _residuals(discovery, surprises)]
+    first_record = replace(discovery, baseline=first_film(discovery.baseline), fit=first_film(discovery.fit))
+    made = [_measured(discovery, first_record, film), _errors(discovery), _residuals(discovery, surprises)]
     if not discovery.effects:
-        return (*made, _tried(discovery), _limits(discovery), _numbers(discovery, one))
-    return (*made, _tried(discovery), others(discovery), _limits(discovery), _numbers(discovery, one))
+        return (*made, _tried(discovery), _limits(discovery), _numbers(discovery, first_record))
+    return (
+        *made,
+        _tried(discovery),
+        others(discovery),
+        _limits(discovery),
+        _numbers(discovery, first_record),
+    )
 
 
-def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str] | None) -> Section:
+def _measured(discovery: Discovery, first_record: Discovery, film: str | os.PathLike[str] | None) -> Section:
     profile = discovery.fit.model.profile.shown
     disk = profile.contact
-    movie = animation.side_by_side(one, film)
+    movie = animation.side_by_side(first_record, film)
     moving = (
         f"{'The film' if movie.filmed else 'The measured motion'} next to the models, at half its speed. The "
         f"held-out data begin at T = {movie.start:.1f} s. There each model starts from its own best estimate "
@@ -138,9 +144,9 @@ def _measured(discovery: Discovery, one: Discovery, film: str | os.PathLike[str]
     shown = parts(
         Paragraph(tables.measured(discovery)),
         Figure(movie, moving + (chaotic if disk else "")),
-        Figure(figures.frames(one, film), overlay) if film is not None else None,
-        Figure(figures.orbits(one), path + free),
-        Figure(figures.forecast(one), closer),
+        Figure(figures.frames(first_record, film), overlay) if film is not None else None,
+        Figure(figures.orbits(first_record), path + free),
+        Figure(figures.forecast(first_record), closer),
     )
     return Section("The measured motion", shown)
 
@@ -195,7 +201,7 @@ def _residuals(discovery: Discovery, surprises: Sequence[Innovations]) -> Sectio
     loose = [loosest(discovery.baseline)]
     if discovery.effects:
         loose.append(loosest(discovery.fit))
-    more = (
+    remark = (
         "A frame marks larger residuals of the known model. A pattern may also show in equations that are "
         "right, but with the effect all patterns should be gone."
         if discovery.effects
@@ -203,7 +209,7 @@ def _residuals(discovery: Discovery, surprises: Sequence[Innovations]) -> Sectio
     )
     said = (
         "If a model is right, the residual of each equation is noise about zero along every coordinate. "
-        f"{more}"
+        f"{remark}"
     )
     colours = "; orange the known model, blue with the added effect" if discovery.effects else ""
     caption = (
@@ -362,7 +368,7 @@ def _limits(discovery: Discovery) -> Section:
     return Section("Limits of these data", (Bullets(tuple(wording.limits(discovery))),))
 
 
-def _numbers(discovery: Discovery, one: Discovery) -> Section:
+def _numbers(discovery: Discovery, first_record: Discovery) -> Section:
     columns = {
         "name": Column("symbol", names=True),
         "meaning": Column("what it is"),
@@ -405,7 +411,7 @@ def _numbers(discovery: Discovery, one: Discovery) -> Section:
         table("Faults of the camera", columns, tables.camera(discovery)),
         Subheading("The noise"),
         Figure(
-            figures.misfits(one.fit),
+            figures.misfits(first_record.fit),
             f"Measured less fitted, with {fitted}. The band holds 95 % of the noise.",
         ),
         table("The noise", noise, tables.noise(discovery.fit)),

@@ -66,22 +66,35 @@ def orbits(discovery: Discovery) -> Image:
 
 def forecast(discovery: Discovery) -> Image:
     """The first seconds of the held-out data, and what the models make of them."""
-    found = runs.forecast(discovery)
+    prediction = runs.forecast(discovery)
     name = discovery.fit.model.profile.shown.columns[-1]
     k = discovery.measurement.names.index(name)
     figure, ((ax,),) = blank(9.0, 3.2, top=0.4)
-    ax.plot(found.t_seen, scale(name) * found.seen[:, k], ".", color=MEASURED, markersize=5, label="measured")
-    ax.plot(found.t, scale(name) * found.before[:, k], color=BEFORE, linewidth=1.5, label="the known model")
+    ax.plot(
+        prediction.t_seen,
+        scale(name) * prediction.seen[:, k],
+        ".",
+        color=MEASURED,
+        markersize=5,
+        label="measured",
+    )
+    ax.plot(
+        prediction.t,
+        scale(name) * prediction.before[:, k],
+        color=BEFORE,
+        linewidth=1.5,
+        label="the known model",
+    )
     if discovery.effects:
         ax.plot(
-            found.t,
-            scale(name) * found.after[:, k],
+            prediction.t,
+            scale(name) * prediction.after[:, k],
             color=AFTER,
             linewidth=1.5,
             label="with the added effect",
         )
-    if found.start >= found.t_seen[0]:
-        ax.axvline(found.start, color="black", linewidth=0.8)
+    if prediction.start >= prediction.t_seen[0]:
+        ax.axvline(prediction.start, color="black", linewidth=0.8)
     ax.set_xlabel(label("t"))
     ax.set_ylabel(label(name))
     ax.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
@@ -142,13 +155,13 @@ def errors(discovery: Discovery) -> Image:
     return svg(figure, "Median error on held-out data against the forecast horizon")
 
 
-def whiteness(found: Sequence[Innovations]) -> Image:
+def whiteness(innovations: Sequence[Innovations]) -> Image:
     """Autocorrelation of the innovations, before and after."""
-    names = found[0].names
+    names = innovations[0].names
     figure, grid = blank(max(3.1 * len(names), 8.0), 2.7, columns=len(names), top=0.4)
     said = (("the known model", BEFORE), ("with the added effect", AFTER))
     for ax, name in zip(grid[0], names, strict=True):
-        for each, (words, colour) in zip(found, said, strict=False):
+        for each, (words, colour) in zip(innovations, said, strict=False):
             plot.whiteness(each, ax, channel=name, colour=colour, name=words)
         title = CHANNELS[name][0] if name in CHANNELS else name
         ax.text(0.95, 0.95, title, ha="right", va="top", transform=ax.transAxes)

@@ -65,7 +65,7 @@ def formula_head(discovery: Discovery) -> Head:
 
 def sections(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[Section, ...]:
     """Build the sections on motion, model, errors, candidates, innovations and numbers."""
-    made = [_measured(discovery), _known(discovery), _errors(discovery), _tried(discovery)]
+    made = [_measured(discovery), _model(discovery), _errors(discovery), _tried(discovery)]
     if discovery.effects:
         made.append(others(discovery))
     made.append(Section("The innovations", whiteness(discovery, surprises)))
@@ -81,7 +81,7 @@ def _measured(discovery: Discovery) -> Section:
     return Section("The measured motion", shown)
 
 
-def _known(discovery: Discovery) -> Section:
+def _model(discovery: Discovery) -> Section:
     shown = tuple(Paragraph(equation, "formula") for equation in equations(discovery))
     return Section("The known model", shown)
 
@@ -192,13 +192,13 @@ def measured(discovery: Discovery) -> str:
 
 def _free_runs(discovery: Discovery) -> Image:
     names = [name for name in discovery.fit.channels if name in discovery.measurement.names]
-    t, seen, found = side_by_side(discovery, _SHOWN * discovery.error_before.horizons[-1])
+    t, seen, modelled = side_by_side(discovery, _SHOWN * discovery.error_before.horizons[-1])
     figure, grid = blank(9.0, 1.7 * len(names) + 0.9, rows=len(names), top=0.4)
     said = (("the known model", KNOWN), ("with the added effect", ADDED))
     for (ax,), name in zip(grid, names, strict=True):
         k = discovery.fit.channels.index(name)
         ax.plot(t, seen[:, k], ".", color=MEASURED, markersize=3, label="measured")
-        for values, (label, colour) in zip(found, said, strict=False):
+        for values, (label, colour) in zip(modelled, said, strict=False):
             ax.plot(t, values[:, k], color=colour, linewidth=1.4, label=label)
         low, high = np.nanmin(seen[:, k]), np.nanmax(seen[:, k])
         ax.set_ylim(low - 0.3 * (high - low), high + 0.3 * (high - low))

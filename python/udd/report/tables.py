@@ -56,12 +56,12 @@ def _knots(discovery: Discovery) -> set[str]:
 def _rows(
     discovery: Discovery, wanted: Callable[[str], bool], share: tuple[str, float] = ("", 1.0)
 ) -> list[dict[str, str]]:
-    known = units(discovery.fit)
+    unit_of = units(discovery.fit)
     # Numbers as of `udd fit`: their standard errors contain what the known model misses.
     baseline = loosest(discovery.baseline).with_diagnostics() if discovery.effects else discovery.baseline
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
-        unit, factor = small_unit(known[name]) if known[name] else share
+        unit, factor = small_unit(unit_of[name]) if unit_of[name] else share
         rows.append(
             {
                 "name": wording.pretty(_base(name).split(".")[-1]),
@@ -122,16 +122,16 @@ def whiteness(innovations: Sequence[Innovations]) -> list[dict[str, str]]:
     """List the tests of the innovations, channel by channel, before and after."""
     rows = []
     for k, name in enumerate(innovations[0].names):
-        for found, model in zip(innovations, ("known model", "with the effect"), strict=False):
-            lags = shown_lags(found)
-            rho, _ = found.autocorrelation(lags)
+        for model_innovations, model in zip(innovations, ("known model", "with the effect"), strict=False):
+            lags = shown_lags(model_innovations)
+            rho, _ = model_innovations.autocorrelation(lags)
             rows.append(
                 {
                     "name": wording.pretty(name) if model == "known model" else "",
                     "model": model,
-                    "square": f"{found.chi2[k]:.3g}",
+                    "square": f"{model_innovations.chi2[k]:.3g}",
                     "largest": f"{rho[int(np.abs(rho[:, k]).argmax()), k]:+.2f}".replace("-", "−"),
-                    "p": wording.probability(float(found.ljung_box(lags)[1][k])),
+                    "p": wording.probability(float(model_innovations.ljung_box(lags)[1][k])),
                 }
             )
     return rows
@@ -198,7 +198,7 @@ def curves(discovery: Discovery, stage: int, most: int = 6) -> list[dict[str, st
 def candidates(discovery: Discovery, stage: int, most: int = 12) -> list[dict[str, str]]:
     """List the scores of the best candidates."""
     rows = []
-    found = {f.tried or f.title for f in discovery.effects}
+    accepted = {f.tried or f.title for f in discovery.effects}
     alike = {a.title for a in discovery.alternatives}
     fitted = decreases(discovery, stage)
     for s in discovery.scans[stage][:most] if stage < len(discovery.scans) else []:
@@ -215,7 +215,7 @@ def candidates(discovery: Discovery, stage: int, most: int = 12) -> list[dict[st
                     for p, v, e in zip(s.candidate.effect.amplitudes, s.amplitudes, s.errors, strict=True)
                 ),
                 "said": "found"
-                if title in found
+                if title in accepted
                 else "cannot be distinguished"
                 if title in alike
                 else "not visible in this record"

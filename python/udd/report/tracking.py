@@ -50,7 +50,7 @@ _SHORT = {"Y": "Y", "Z": "Z", "beta": "β", "theta": "θ"}
 
 def write_tracked(
     video: str | os.PathLike[str],
-    found: Measurement | Tracking,
+    result: Measurement | Tracking,
     path: str | os.PathLike[str],
     *,
     command: str | None = None,
@@ -60,13 +60,13 @@ def write_tracked(
     from udd.tracking.pipeline import Tracking
 
     refuse_folder(path)
-    detail = found if isinstance(found, Tracking) else None
-    m: Measurement = found.measurement if isinstance(found, Tracking) else found
+    detail = result if isinstance(result, Tracking) else None
+    m: Measurement = result.measurement if isinstance(result, Tracking) else result
     if "calibration" not in m.meta or not m.quality:
         raise UddError("the measurement was not tracked in a film, so there is no page about it")
     marks = profile_of(m.kind).sensor.sees_marks
     checked = health(m) if marks else None
-    sections = [_found(video, m), _calibrated(m), _each_frame(m, detail)]
+    sections = [_measured(video, m), _calibrated(m), _each_frame(m, detail)]
     if marks:
         sections.append(_rolls(checked))
     write_page(Report(_head(m, checked), tuple(sections), identity(video), command), path)
@@ -91,7 +91,7 @@ def _head(m: Measurement, checked: Health | None) -> Head:
     return Head("Tracking", headline(m), numbers=numbers(m, checked), notes=notes)
 
 
-def _found(video: str | os.PathLike[str], m: Measurement) -> Section:
+def _measured(video: str | os.PathLike[str], m: Measurement) -> Section:
     drawn = (
         "the fitted rim, the marks where the fit has them, and the contact (cross)"
         if profile_of(m.kind).sensor.sees_marks

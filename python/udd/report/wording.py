@@ -130,20 +130,20 @@ def rejected(discovery: Discovery) -> list[str]:
     Effects with the same errors and the same reason share a sentence.
     """
     groups: dict[tuple[str, ...], list[str]] = {}
-    for near in discovery.rejected:
-        numbers = headline(replace(discovery, error_after=near.errors, ratio=near.ratio))
+    for candidate in discovery.rejected:
+        numbers = headline(replace(discovery, error_after=candidate.errors, ratio=candidate.ratio))
         why = {
-            "chance": f"χ² decreases by {near.chi2:.1f} in units of the remaining scatter at these "
-            f"frequencies, and the probability of that by chance is {probability(near.p)}",
+            "chance": f"χ² decreases by {candidate.chi2:.1f} in units of the remaining scatter at these "
+            f"frequencies, and the probability of that by chance is {probability(candidate.p)}",
             "drift": "a slow drift of the sensor's zero would explain more",
             "part": "the first part of the record does not show it beyond chance",
             "unconfirmed": "that is not clearly an improvement",
             "held": "the held-out frames do not confirm it",
             "form": "another form fits these data clearly better, and was rejected",
             "records": "only some of the records need it",
-        }[near.why]
+        }[candidate.why]
         key = (numbers.span, numbers.before, numbers.after, numbers.ratio, numbers.interval, why)
-        groups.setdefault(key, []).append(f"{near.title} ({near.effect.expression})")
+        groups.setdefault(key, []).append(f"{candidate.title} ({candidate.effect.expression})")
     return [
         f"{' or '.join(names)} would bring the held-out error {span} from {before} to {after}, "
         f"ratio {ratio} ({interval}), but {why}."
@@ -157,16 +157,16 @@ def reaches_noise_floor(discovery: Discovery) -> bool:
     return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
 
 
-def _meanings(found: AddedEffect, discovery: Discovery) -> list[str]:
+def _meanings(added: AddedEffect, discovery: Discovery) -> list[str]:
     """Describe an added effect and the effects that act identically."""
     same = [
         a.effect
         for a in discovery.alternatives
-        if a.likeness > IDENTICAL and a.instead_of == found.effect.name
+        if a.likeness > IDENTICAL and a.instead_of == added.effect.name
     ]
-    sentences = [effect_sentence(e) for e in [found.effect, *same]]
-    if found.curve is not None:  # the meaning says where, the curve says with what
-        sentences[0] += f", depending on {' and '.join(along(c.name) for c in found.curve.coordinates)}"
+    sentences = [effect_sentence(e) for e in [added.effect, *same]]
+    if added.curve is not None:  # the meaning says where, the curve says with what
+        sentences[0] += f", depending on {' and '.join(along(c.name) for c in added.curve.coordinates)}"
     return list(dict.fromkeys(sentences))
 
 
@@ -184,12 +184,12 @@ def along(name: str) -> str:
     }.get(name, name)
 
 
-def values_of(found: AddedEffect, units: dict[str, str]) -> Markup:
+def values_of(added: AddedEffect, units: dict[str, str]) -> Markup:
     """List an effect's parameters in a sentence."""
     texts = []
-    for name, value in found.parameters.items():
-        unit = unit_words(units.get(f"{found.effect.name}.{name}", ""))
-        number = Markup("<b>{} = {}</b>").format(pretty(name), with_error(value, found.errors.get(name)))
+    for name, value in added.parameters.items():
+        unit = unit_words(units.get(f"{added.effect.name}.{name}", ""))
+        number = Markup("<b>{} = {}</b>").format(pretty(name), with_error(value, added.errors.get(name)))
         texts.append(number + Markup(" ") + unit if unit else number)
     return Markup(", ").join(texts)
 
@@ -314,15 +314,20 @@ def limit(other: Alternative) -> str:
 
 def command(discovery: Discovery, source: str | None) -> str | None:
     """Return the command of `udd discover` for the same analysis; None if the file is not known."""
-    known = discovery.baseline.problem.models[0]
-    if source is None or known.effects or known.profile.written or len(discovery.fit.measurements) > 1:
+    bare_model = discovery.baseline.problem.models[0]
+    if (
+        source is None
+        or bare_model.effects
+        or bare_model.profile.written
+        or len(discovery.fit.measurements) > 1
+    ):
         return None
-    given = [next(iter(known.parameters))]  # which has no default
-    made: Callable[[float], Model] = type(known)
-    usual = made(known.parameters[given[0]])
-    given += [name for name, value in known.parameters.items() if value != usual.parameters[name]]
-    names = known.profile.shown.options
-    options = (f"--{names.get(name, name)} {known.parameters[name]!r}" for name in dict.fromkeys(given))
+    given = [next(iter(bare_model.parameters))]  # which has no default
+    made: Callable[[float], Model] = type(bare_model)
+    usual = made(bare_model.parameters[given[0]])
+    given += [name for name, value in bare_model.parameters.items() if value != usual.parameters[name]]
+    names = bare_model.profile.shown.options
+    options = (f"--{names.get(name, name)} {bare_model.parameters[name]!r}" for name in dict.fromkeys(given))
     return f"udd discover {shlex.quote(source)} {' '.join(options)} --report report.html"
 
 
