@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import pairwise
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,12 @@ from udd._util.validation import whole
 from udd.errors import IncompleteWarning, IntegrationError, ModelError
 
 from .branch import Branch, cycles_of
-from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats, FlowMap
-from .periodic_orbits import cycle_at
+from .manifold_search import Accuracy, brackets, converge, distinct, secant
+from .saddle_cycles import SaddleCycle, saddle_at
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import PeriodicOrbit
+from .transient_lifetimes import first_stay
 
 __all__ = ["Crisis", "crises"]
 
@@ -35,11 +36,9 @@ _HALVINGS = 12  # of an interval at most, until passages lie close to the stable
 _CLOSE = 1e-3  # typical sizes: so near the stable manifold the fold of the unstable one is looked at
 _TIPS = 4  # folds that are tried at a time, earliest first
 _TRIES = 4
+_WIDE, _NARROW = 1e-3, 1e-4  # of a fold, in rounds: of a first guess, and of one at a value near by
 _STENCIL = np.linspace(-1.0, 1.0, 7)
 _FOLDS = 40  # steps to a fold at most
-_ROUNDS = 8  # about the cycle at most, until the parameter stands
-_STANDS = 1e-13  # by this relative change
-_STEPS = 30
 _STAYS = 20  # crossings in a row near the attractor that mean that an orbit stays there
 _AGE = 400  # typical times for which the manifold's other side is followed, twice
 _OTHERS = 48  # orbits of it
@@ -148,97 +147,11 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     >>> print(one.kind, one.side)
     boundary crisis above
     """
-    cycles_of(branch)
+    flow = cycles_of(branch).flow
     count, rounds = whole("n", n, 10), whole("depth", depth, 5)
     require_memory(f"{count} orbits of {rounds} rounds", count, rounds, 8, itemsize=8)
-    found = [one for side in (1.0, -1.0) for one in _Search(branch, side, count, rounds).crises()]
-    distinct: list[Crisis] = []
-    for one in sorted(found, key=lambda one: one.value):
-        # The two sides of a symmetric cycle may be mirror images.
-        near = one.error + distinct[-1].error if distinct else 0.0
-        if not distinct or one.value - distinct[-1].value > max(near, 1e-9 * abs(one.value)):
-            distinct.append(one)
-    return distinct
-
-
-@dataclass(frozen=True, eq=False)
-class _Saddle:
-    """A cycle with one multiplier above 1: a state, the rate there, and the directions of that multiplier."""
-
-    flow: FlowMap
-    values: Floats
-    value: float
-    state: Floats
-    rate: Floats
-    right: Floats
-    left: Floats
-    multiplier: float
-    cycle: PeriodicOrbit
-
-    def facing(self, other: _Saddle | None) -> _Saddle:
-        """With the directions turned to those of a neighbour: an eigenvector's sign is arbitrary."""
-        if other is None or self.right @ other.right > 0.0:
-            return self
-        return replace(self, right=-self.right, left=-self.left)
-
-    @property
-    def period(self) -> float:
-        """The cycle's."""
-        return self.cycle.period
-
-    def height(self, x: Floats) -> Floats:
-        """How far states (..., r) are from the stable manifold's tangent, along the unstable direction."""
-        height: Floats = ((x - self.state) / self.flow.size) @ self.left
-        return height
-
-    def distance(self, x: Floats) -> Floats:
-        """How far states (..., r) are from the cycle's state."""
-        gap: Floats = np.linalg.norm((x - self.state) / self.flow.size, axis=-1)
-        return gap
-
-    @cached_property
-    def plane(self) -> str:
-        """The plane through the state across the flow, as an expression."""
-        names = [self.flow.model.state_names[k] for k in self.flow.kept]
-        weights = self.rate / self.flow.size / np.linalg.norm(self.rate)
-        terms = zip(names, weights.tolist(), self.state.tolist(), strict=True)
-        return " + ".join(f"({weight!r})*({name} - ({x!r}))" for name, weight, x in terms)
-
-    def start(self, u: Floats, side: float, away: float) -> Floats:
-        """States on one side of the unstable manifold: after one round `u` is larger by 1."""
-        along = side * away * self.multiplier ** np.asarray(u)[:, None] * self.right
-        return np.asarray(self.state + self.flow.size * along)
-
-
-def _saddle_of(curve: PeriodicOrbitCurve, u: Floats) -> _Saddle | None:
-    """The cycle, if one multiplier is above 1 and all others are inside the unit circle."""
-    flow, values = curve.flow, curve.values_at(u)
-    closing = curve.monodromy(u)
-    # A symmetric cycle is taken over the whole period: in the mirror the sides may change.
-    around = flow.scaled(closing @ closing if curve.symmetric else closing)
-    numbers, right = np.linalg.eig(around)
-    across = np.abs(numbers - 1.0) > 1e-6
-    outside = np.flatnonzero(across & (np.abs(numbers) > 1.0))
-    if len(outside) != 1 or abs(numbers[outside[0]].imag) > 0.0 or numbers[outside[0]].real < _SLOW:
-        return None
-    place = int(outside[0])
-    vector = right[:, place].real
-    left = np.linalg.inv(right)[place]
-    turned = left.real * (right[:, place] @ left).real  # both may have been scaled by the same phase
-    state = curve.nodes(u)[0]
-    rate = curve.rate_at(values, state) / flow.size
-    norm = float(np.linalg.norm(vector))
-    return _Saddle(
-        flow,
-        values,
-        curve.value(u),
-        state,
-        rate,
-        vector / norm,
-        turned * norm,
-        float(numbers[place].real),
-        cycle_at(curve, u),
-    )
+    sides = (_Search(branch, flow, side, count, rounds) for side in (1.0, -1.0))
+    return distinct([crisis for side in sides for crisis in side.crises()])
 
 
 @dataclass(frozen=True)
@@ -263,57 +176,46 @@ class _Passages:
         return [(float(self.u[k]), float(self.t[k])) for k in early[:_TIPS]]
 
 
+@dataclass(frozen=True)
 class _Search:
     """One side of the unstable manifolds of a branch's saddle cycles."""
 
-    def __init__(self, branch: Branch, side: float, count: int, depth: int) -> None:
-        curve = branch._places[0][0]
-        assert isinstance(curve, PeriodicOrbitCurve)
-        self.branch, self.flow = branch, curve.flow
-        self.side, self.count, self.depth = side, count, depth
-        self.away, self.loose = _AWAY, 1.0
+    branch: Branch
+    flow: FlowMap
+    side: float
+    count: int
+    depth: int
 
     def crises(self) -> list[Crisis]:
-        """Those between neighbouring cycles of the branch of which one side is shut in."""
-        seen: list[tuple[_Saddle, bool] | None] = []
-        last: _Saddle | None = None
+        """Return those between neighbouring cycles of the branch of which one side is shut in."""
+        marks: list[tuple[SaddleCycle, bool] | None] = []
+        last: SaddleCycle | None = None
         for curve, place in self.branch._places:
             assert isinstance(curve, PeriodicOrbitCurve)
-            saddle = _saddle_of(curve, place.u)
-            if saddle is None:
-                seen.append(None)
+            saddle = SaddleCycle.of(curve, place.u)
+            if saddle is None or saddle.multiplier < _SLOW:
+                marks.append(None)
                 continue
             last = saddle = saddle.facing(last)
-            seen.append((saddle, self._passages(saddle).crossed))
-        found = []
-        for one, other in pairwise(seen):
-            if one is None or other is None or one[1] == other[1]:
-                continue
-            shut, open_ = (one[0], other[0]) if other[1] else (other[0], one[0])
-            try:
-                found.append(self._located(shut, open_))
-            except (ModelError, IntegrationError):
-                continue  # no fold reaches the stable manifold: passages of another kind
-        return found
+            marks.append((saddle, self._passages(saddle).crossed))
 
-    def _saddle(self, value: float, like: _Saddle) -> _Saddle:
-        """The saddle cycle at a value of the parameter that lies near a known one."""
-        near = [one for one in self.branch.at(value) if isinstance(one, PeriodicOrbit)]
-        near.sort(key=lambda one: float(like.distance(self.flow.reduced(one.state))))
-        for one in near:
-            assert one._curve is not None and one._unknowns is not None
-            saddle = _saddle_of(one._curve, one._unknowns)
-            if saddle is not None:
-                return saddle.facing(like)
-        raise ModelError(f"no saddle cycle is found at {value:.10g}")
+        def located(a: tuple[SaddleCycle, bool], b: tuple[SaddleCycle, bool]) -> Crisis:
+            return self._located(a[0], b[0]) if b[1] else self._located(b[0], a[0])
 
-    def _crossings(self, saddle: _Saddle, starts: Floats, time: float) -> tuple[Floats, Floats]:
-        """Times (n, k) and states (n, k, r) where orbits cross the cycle's plane, NaN after the last."""
+        return brackets(marks, lambda a, b: a[1] != b[1], located)
+
+    def _start(self, saddle: SaddleCycle, u: Floats, side: float) -> Floats:
+        """Return states on one side of the unstable manifold: after one round `u` is larger by 1."""
+        along = side * _AWAY * saddle.multiplier ** u[:, None] * saddle.right
+        return np.asarray(saddle.state + self.flow.size * along)
+
+    def _crossings(self, saddle: SaddleCycle, starts: Floats, time: float) -> tuple[Floats, Floats]:
+        """Return times (n, k) and states (n, k, r) of crossings of the cycle's plane, NaN after the last."""
         from udd.chaos.poincare_sections import poincare
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IncompleteWarning)  # they end by the time
-            found = poincare(
+            section = poincare(
                 self.flow.with_values(saddle.values),
                 saddle.plane,
                 int(20.0 * time / saddle.period) + 20,
@@ -325,37 +227,38 @@ class _Search:
                 atol=1e-12,
                 progress=False,
             )
-        return found.t, self.flow.reduced(found.state)
+        return section.t, self.flow.reduced(section.state)
 
-    def _passages(self, saddle: _Saddle) -> _Passages:
-        """Where the manifold comes beside the cycle again, after it has left it."""
+    def _passages(self, saddle: SaddleCycle) -> _Passages:
+        """Return where the manifold comes near the cycle again, after it has left it."""
         u = (np.arange(self.count) + 0.5) / self.count
-        leaves = np.log(1.0 / self.away) / np.log(saddle.multiplier)
-        starts = saddle.start(u, self.side, self.away)
-        t, x = self._crossings(saddle, starts, (leaves + self.depth) * saddle.period)
+        leaves = np.log(1.0 / _AWAY) / np.log(saddle.multiplier)
+        t, x = self._crossings(
+            saddle, self._start(saddle, u, self.side), (leaves + self.depth) * saddle.period
+        )
         height, away = self.side * saddle.height(x), saddle.distance(x)
         # The first rounds are still those on which it leaves.
-        left = (np.log(_LEFT / self.away) / np.log(saddle.multiplier) - u) * saddle.period
-        near = (t > left[:, None]) & (away < _NEAR)
-        which, first = np.nonzero(near)
+        left = (np.log(_LEFT / _AWAY) / np.log(saddle.multiplier) - u) * saddle.period
+        close = (t > left[:, None]) & (away < _NEAR)
+        which, first = np.nonzero(close)
         heights = np.full(len(which), np.nan)
-        # The plane may be crossed several times in a round: the crossing one period later is what tells.
+        # The plane may be crossed several times in a round: the crossing one period later decides.
         for ahead in range(1, min(20, t.shape[1])):
             after = np.minimum(first + ahead, t.shape[1] - 1)
             late = np.abs(t[which, after] - t[which, first] - saddle.period) < 0.1 * saddle.period
             grown = height[which, after] / (saddle.multiplier * height[which, first])
             agrees = late & (away[which, after] < _NEAR) & (grown > 1.0 / _AGREES) & (grown < _AGREES)
             heights[agrees] = height[which, after][agrees] / saddle.multiplier
-        told = np.isfinite(heights)
-        return _Passages(u[which[told]], t[which[told], first[told]], heights[told])
+        decided = np.isfinite(heights)
+        return _Passages(u[which[decided]], t[which[decided], first[decided]], heights[decided])
 
-    def _located(self, shut: _Saddle, open_: _Saddle) -> Crisis:
-        """The tangency between a cycle that shuts the attractor in and one that does not."""
+    def _located(self, shut: SaddleCycle, open_: SaddleCycle) -> Crisis:
+        """Return the tangency between a cycle that shuts the attractor in and one that does not."""
         passages = self._passages(shut)
         for _ in range(_HALVINGS):
             if passages.height.min(initial=np.inf) < _CLOSE:
                 break
-            middle = self._saddle(0.5 * (shut.value + open_.value), shut)
+            middle = saddle_at(self.branch, 0.5 * (shut.value + open_.value), shut)
             between = self._passages(middle)
             if between.crossed:
                 open_ = middle
@@ -365,76 +268,57 @@ class _Search:
         for _ in range(_TRIES):
             tangencies: list[tuple[float, float, float]] = []
             for u, t in passages.nearest():
-                try:
-                    value, at = self._tangency(shut, u, t, 0, width)
-                except (ModelError, IntegrationError):
-                    continue
-                if abs(value - shut.value) < 10.0 * width:
-                    tangencies.append((value, at, t))
+                with suppress(ModelError, IntegrationError):
+                    guess = np.array([shut.value, u, _WIDE])
+                    value, at, _ = self._tangency(shut, t, guess, 0, width, Accuracy(_AWAY))
+                    if abs(value - shut.value) < 10.0 * width:
+                        tangencies.append((value, at, t))
             if not tangencies:
                 break
             # The first one that is met from where the attractor is shut in.
-            first = max(tangencies) if above else min(tangencies)
-            value, error, saddle = self._settled(shut, *first)
+            value, at, t = max(tangencies) if above else min(tangencies)
+            x, error, _ = converge(
+                partial(self._tangency, shut, t),
+                np.array([value, at, _WIDE]),
+                1e-6 * abs(value),
+                Accuracy(_AWAY),
+            )
+            value = float(x[0])
             aside = max(1e-8 * abs(value), 10.0 * error)
-            before = self._saddle(value + (aside if above else -aside), shut)
+            before = saddle_at(self.branch, value + (aside if above else -aside), shut)
             passages = self._passages(before)
             if not passages.crossed:
-                cycle, side = saddle.cycle, "above" if above else "below"
-                count = len(passages.t)
+                cycle, side = saddle_at(self.branch, value, shut).cycle, "above" if above else "below"
                 aside = max(_ASIDE * abs(value), aside)
-                kind = self._kind(self._saddle(value + (aside if above else -aside), shut))
-                return Crisis(kind, self.branch.parameter, value, error, side, count, cycle)
+                kind = self._kind(saddle_at(self.branch, value + (aside if above else -aside), shut))
+                return Crisis(kind, self.branch.parameter, value, error, side, len(passages.t), cycle)
             # Another fold is beyond the stable manifold there already.
             shut = before
         raise ModelError("no fold of the manifold reaches the stable one first")
 
-    def _settled(self, like: _Saddle, value: float, u: float, t: float) -> tuple[float, float, _Saddle]:
-        """The tangency near a value by more and more rounds about the cycle, its error and the cycle."""
-        moved, rounds = 1e-6 * abs(value), 0
-        for rounds in range(1, _ROUNDS):
-            after, u = self._tangency(self._saddle(value, like), u, t, rounds, moved)
-            moved, value = abs(after - value), after
-            if moved < _STANDS * abs(value):
-                break
-        error = moved + float(rounding_of(value))
-        saddle = self._saddle(value, like)
-        try:
-            for away, loose in ((10.0 * _AWAY, 1.0), (_AWAY, COARSE)):
-                self.away, self.loose = away, loose
-                # The same state further out is one that was there earlier.
-                other = u - np.log(away / _AWAY) / np.log(saddle.multiplier)
-                error += abs(self._tangency(saddle, other, t, rounds, 1e-7 * abs(value))[0] - value)
-        finally:
-            self.away, self.loose = _AWAY, 1.0
-        return value, error, saddle
+    def _tangency(
+        self, like: SaddleCycle, t: float, x: Floats, rounds: int, step: float, accuracy: Accuracy
+    ) -> Floats:
+        """Return the value at which a fold touches the stable manifold, its `u`, and its width."""
+        # The same orbit further out is the one that began whole rounds earlier.
+        earlier = np.ceil(np.log(accuracy.away / _AWAY) / np.log(like.multiplier))
 
-    def _tangency(self, like: _Saddle, u: float, t: float, rounds: int, step: float) -> tuple[float, float]:
-        """The parameter's value at which a fold touches the stable manifold, and where on the manifold."""
+        def fold(y: Floats) -> tuple[float, Floats]:
+            saddle = saddle_at(self.branch, float(y[0]), like)
+            time = t - float(earlier) * saddle.period
+            bottom, u = self._fold(saddle, float(y[1]), time, rounds, float(y[2]), accuracy.loose)
+            return bottom, np.array([y[0], u, _NARROW])
 
-        def fold(value: float, near: float, width: float) -> tuple[float, float]:
-            return self._fold(self._saddle(value, like), near, t, rounds, width)
+        found = secant(fold, np.array([x[0], x[1] + earlier, _WIDE]), step)
+        return np.array([found[0], found[1] - earlier, _WIDE])
 
-        step = max(step, 1e-8 * abs(like.value))
-        a, b = like.value, like.value + 0.1 * step
-        (fa, u), width = fold(a, u, 1e-3), 1e-4
-        fb, u = fold(b, u, width)
-        for _ in range(_STEPS):
-            if fa == fb:
-                break
-            a, b, fa = b, b - fb * (b - a) / (fb - fa), fb
-            if not np.isfinite(b) or abs(b - like.value) > 20.0 * step:
-                raise ModelError("the value does not settle")
-            if abs(b - a) < 0.1 * _STANDS * abs(b):
-                break
-            fb, u = fold(b, u, width)
-        return float(b), u
-
-    def _fold(self, saddle: _Saddle, u: float, t: float, rounds: int, width: float) -> tuple[float, float]:
-        """The height of the manifold's fold near `u`, some rounds after the time t, and where it is."""
+    def _fold(
+        self, saddle: SaddleCycle, u: float, t: float, rounds: int, width: float, loose: float
+    ) -> tuple[float, float]:
+        """Return the height of the manifold's fold near `u`, some rounds after the time t, and its `u`."""
         for _ in range(_FOLDS):
             at = u + width * _STENCIL
-            heights = self._heights(saddle, at, t, rounds)
+            heights = self._heights(saddle, at, t, rounds, loose)
             if not np.isfinite(heights).all():
                 width *= 0.1
                 continue
@@ -453,59 +337,42 @@ class _Search:
             width *= 0.25 if misfit < 1e-2 * bend else 0.1
         raise ModelError("the manifold has no fold there")
 
-    def _heights(self, saddle: _Saddle, u: Floats, t: float, rounds: int) -> Floats:
-        """How far orbits of the manifold are from the stable one's tangent, divided by how it grows."""
-        flow, rows = self.flow, np.tile(saddle.values, (len(u), 1))
-
-        def flown(x: Floats, spans: Floats) -> Floats:
-            return flow.fly_each(rows, x, spans, loose=self.loose)
-
-        x = flown(saddle.start(u, self.side, self.away), np.full(len(u), t))
-        for k in range(rounds + 1):
-            if k:
-                x = flown(x, np.full(len(u), saddle.period))
-            for _ in range(20):
-                # To the plane across the flow at the cycle's state.
-                ahead = ((x - saddle.state) / flow.size) @ saddle.rate
-                late = -ahead / (saddle.rate @ saddle.rate)
-                if np.abs(late).max() < 1e-13 * flow.clock:
-                    break
-                x = flown(x, np.clip(late, -0.2 * flow.clock, 0.2 * flow.clock))
+    def _heights(self, saddle: SaddleCycle, u: Floats, t: float, rounds: int, loose: float) -> Floats:
+        """Return how far orbits of the manifold are from the stable one's tangent; NaN far from the cycle."""
+        x, many = self._start(saddle, u, self.side), np.ones(len(u))
+        for span in (t, *[saddle.period] * rounds):
+            x = saddle.landed(self.flow.fly_each(saddle.values, x, span * many, loose), loose)
             if not saddle.distance(x).max() < 5.0 * _NEAR:
                 return np.full(len(u), np.nan)
         heights: Floats = self.side * saddle.height(x)
         return heights
 
-    def _kind(self, saddle: _Saddle) -> str:
+    def _kind(self, saddle: SaddleCycle) -> str:
         """Return what becomes of the attractor, by where the other side of the manifold goes."""
         flow, u = self.flow, (np.arange(_OTHERS) + 0.5) / _OTHERS
-        leaves = np.log(1.0 / self.away) / np.log(saddle.multiplier) * saddle.period
+        leaves = np.log(1.0 / _AWAY) / np.log(saddle.multiplier) * saddle.period
         age = _AGE * flow.clock
         time = leaves + 2.0 * age
-        t, x = self._crossings(saddle, saddle.start(u, self.side, self.away), time)
+        t, x = self._crossings(saddle, self._start(saddle, u, self.side), time)
         attractor = x[t > leaves + 0.5 * age]
-        outer = saddle.start(u, -self.side, self.away)
-        comes = _staying(*self._crossings(saddle, outer, time), attractor, flow.size)
+        outer = self._start(saddle, u, -self.side)
+        comes = _arrivals(*self._crossings(saddle, outer, time), attractor, flow.size)
         if flow.mirror is not None and not np.isfinite(comes).any():
             image = self._crossings(saddle, flow.mirror * outer, time)
-            if (_staying(*image, attractor, flow.size) < np.inf).mean() > _MOST:
+            if (_arrivals(*image, attractor, flow.size) < np.inf).mean() > _MOST:
                 return "attractor merging crisis"
         # A chaotic transient that leads to the attractor, if slowly, becomes a part of it.
         early, all_ = (comes < leaves + age).mean(), (comes < np.inf).mean()
         return "interior crisis" if all_ > _MOST or all_ > early + _SOME else "boundary crisis"
 
 
-def _staying(t: Floats, x: Floats, attractor: Floats, size: Floats) -> Floats:
-    """When orbits come to an attractor to stay; infinite for those that do not."""
+def _arrivals(t: Floats, x: Floats, attractor: Floats, size: Floats) -> Floats:
+    """Return when orbits come to an attractor to stay; infinite for those that do not."""
     points = attractor / size
     tree = cKDTree(points)
     gaps = tree.query(points[:: max(1, len(points) // 2000)], k=2)[0][:, 1]
     close = 3.0 * float(np.quantile(gaps, 0.999)) + 1e-6
     there = np.isfinite(t)
     scaled = np.where(there[..., None], x / size, 0.0)
-    near = there & (tree.query(scaled, distance_upper_bound=close)[0] < close)
-    if near.shape[1] < _STAYS:
-        return np.full(len(t), np.inf)
-    held = np.all(np.lib.stride_tricks.sliding_window_view(near, _STAYS, axis=1), axis=2)
-    first = np.take_along_axis(t, np.argmax(held, axis=1)[:, None], axis=1)[:, 0]
-    return np.where(held.any(axis=1), first, np.inf)
+    first, stays = first_stay(there & (tree.query(scaled, distance_upper_bound=close)[0] < close), _STAYS)
+    return np.where(stays, t[np.arange(len(t)), first], np.inf)

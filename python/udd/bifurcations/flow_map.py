@@ -143,8 +143,9 @@ class FlowMap:
             found["rate"][:, kept],
         )
 
-    def fly_each(self, rows: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
-        """Where orbits from `x` (m, r), each with its own parameters `rows` (m, p), are after `spans`."""
+    def fly_each(self, values: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
+        """Return the ends of orbits from `x` (m, r); `values` are those of all (p,) or of each (m, p)."""
+        rows = np.tile(values, (len(x), 1)) if values.ndim == 1 else values
         atol = self.atol * float(np.min(self.size)) * loose
         begin = np.zeros(len(x))
         ends = _core.shoot(self.model, rows, self.full(x), begin, spans, [], self.rtol * loose, atol)["x"]

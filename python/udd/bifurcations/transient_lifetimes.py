@@ -150,12 +150,20 @@ def lifetimes(
         scaled = flow.reduced(run[:, 1:]) / flow.size
         seen = np.hstack([close[jobs], tree.query(scaled)[0] < radius])
         close[jobs] = seen[:, 1 - _STAYS :]
-        held = np.all(np.lib.stride_tricks.sliding_window_view(seen, _STAYS, axis=1), axis=2)
-        first = here + (np.argmax(held, axis=1) + 2 - _STAYS) * flow.clock
-        done = held.any(axis=1) & (first < end)
+        place, stays = first_stay(seen, _STAYS)
+        first = here + (place + 2 - _STAYS) * flow.clock
+        done = stays & (first < end)
         settled[jobs[done]], time[jobs[done]] = True, np.maximum(first[done], 0.0)
         here += float(times[-1])
     return Lifetimes(time, settled, begin)
+
+
+def first_stay(close: NDArray[np.bool_], count: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return where each row (n, k) first has `count` true values in a row, and whether it has them."""
+    if close.shape[1] < count:
+        return np.zeros(len(close), dtype=np.intp), np.zeros(len(close), dtype=bool)
+    stays = np.all(np.lib.stride_tricks.sliding_window_view(close, count, axis=1), axis=2)
+    return np.argmax(stays, axis=1), stays.any(axis=1)
 
 
 def _points(flow: FlowMap, attractor: Equilibrium | PeriodicOrbit) -> Floats:
