@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from udd._util.keywords import renamed_attribute
 from udd._util.one_line import OneLine
+from udd._util.value_text import with_error
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.by_record import RecordAnswer, sentence
@@ -291,10 +292,7 @@ class Discovery:
 
         def numbers(effect: AddedEffect) -> str:
             errors = ((name, value, effect.errors.get(name)) for name, value in effect.parameters.items())
-            return ", ".join(
-                f"{name} = {value:.5g}" + (f" ± {error:.2g}" if error else "")
-                for name, value, error in errors
-            )
+            return ", ".join(f"{name} = {with_error(value, error)}" for name, value, error in errors)
 
         items = "".join(
             f"<li>{escape(e.title)}: <code>{escape(e.expression)}</code>, {escape(numbers(e))}</li>"

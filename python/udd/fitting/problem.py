@@ -14,6 +14,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.keywords import renamed, renamed_attribute
 from udd._util.one_line import OneLine
+from udd._util.value_text import with_error
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
@@ -289,7 +290,8 @@ class Fit(Drawable):
 
     def summary(self) -> str:
         """Summarise the fit on one screen: its diagnostics, and every parameter with its unit."""
-        return "\n".join([self._state, *self.doubts.sentences, *self._table()])
+        head = "parameters, with the standard error of the last digits in brackets:"
+        return "\n".join([self._state, *self.doubts.sentences, head, *self._table()])
 
     @property
     def _state(self) -> str:
@@ -303,7 +305,7 @@ class Fit(Drawable):
 
         all_units = units(self)
         return [
-            f"  {name:<24} {value:>12.5g} +- {self.errors[name]:<8.2g} {all_units[name]:<6} "
+            f"  {name:<24} {with_error(value, self.errors[name]):<18} {all_units[name]:<6} "
             f"{meaning(name, self.model.kind)}".rstrip()
             for name, value in self.parameters.items()
         ]

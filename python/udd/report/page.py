@@ -33,7 +33,8 @@ GUIDE = (
         "The error of a model that runs freely for a time, on data that no fit used.",
     ),
     ("Noise floor", "The error of a faultless model, due to noise in the data and in its starting state."),
-    ("95 % interval", "The true value lies in it in 19 of 20 such cases; ± is one standard error."),
+    ("95 % interval", "The true value lies in it in 19 of 20 such cases."),
+    ("5.03(12)", "A value with the standard error of its last digits: 5.03 ± 0.12."),
     (
         "Decrease in χ²",
         "The misfit in units of the noise, without the effect minus with it. Chance reaches the dashed line "

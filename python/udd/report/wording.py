@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
 
+from udd._util import value_text
 from udd._util.small_units import small_unit
 from udd.discovery.thresholds import SAME as IDENTICAL
 from udd.discovery.validation.held_out_errors import reaches_noise_floor as floor_reached
@@ -246,17 +247,9 @@ def _digits(value: float, n: int) -> str:
 
 
 def with_error(value: float, error: float | None) -> str:
-    """Format a value and its standard error with two digits: ``5.03 ± 0.12``."""
-    if error is None or not math.isfinite(error) or error <= 0:
-        return f"{value:.5g}".replace("-", "−")
-    place = math.floor(math.log10(error))
-    size = math.floor(math.log10(max(abs(value), error)))
-    if size >= 5 or size <= -4:
-        digits = max(size - place + 1, 0)
-        text = f"({value / 10**size:.{digits}f} ± {error / 10**size:.{digits}f}) × 10"
-        return Markup(f"{text}<sup>{size}</sup>".replace("-", "−"))
-    digits = max(1 - place, 0)
-    return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
+    """Format a value with two digits of its standard error in brackets: ``5.03(12)``."""
+    text = value_text.with_error(value, error, " × 10<sup>{}</sup>").replace("-", "−")
+    return Markup(text) if "<" in text else text
 
 
 def probability(p: float) -> str:

@@ -3,7 +3,7 @@ import { Columns } from "./columns.js";
 import { address, request } from "./link.js";
 import { recalled, remember } from "./look.js";
 import { NumberField } from "./numbers.js";
-import { explain } from "./terms.js";
+import { explain, term } from "./terms.js";
 import { list, t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
@@ -252,7 +252,8 @@ export class Loop {
       p.className = "formula";
       const b = document.createElement("b");
       b.textContent = e.equation;
-      p.append(`${e.title}: `, b, e.values.length ? ` ${t("loop_with", { values: e.values.join(", ") })}` : "");
+      p.append(`${e.title}: `, b);
+      if (e.values.length) p.append(" ", term(t("loop_with", { values: e.values.join(", ") }), t("loop_brackets")));
       return p;
     }), ...[...found.limits, ...(found.warnings ?? [])].map((text) => {
       const p = document.createElement("p");

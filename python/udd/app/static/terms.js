@@ -12,12 +12,17 @@ export function explain(element, terms) {
     if (!found) continue;
     const rest = text.splitText(text.data.indexOf(found));
     rest.splitText(found.length);
-    const abbr = document.createElement("abbr");
-    abbr.className = "term";
-    abbr.tabIndex = 0;
-    abbr.title = left.get(found);
-    rest.replaceWith(abbr);
-    abbr.append(found);
+    rest.replaceWith(term(found, left.get(found)));
     left.delete(found);
   }
+}
+
+/** Words with a dotted underline and the sentence that explains them. */
+export function term(words, sentence) {
+  const abbr = document.createElement("abbr");
+  abbr.className = "term";
+  abbr.tabIndex = 0;
+  abbr.title = sentence;
+  abbr.append(words);
+  return abbr;
 }
