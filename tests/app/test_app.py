@@ -191,6 +191,12 @@ def test_the_diagram_tells_coexisting_attractors_apart() -> None:
     assert np.abs(exponents.exponent).max() < 0.05  # periodic: zero, but for the short run
 
 
+def test_the_first_picture_of_a_diagram_has_one_orbit_and_later_ones_three() -> None:
+    start = spec.start_of({"model": {"kind": "dle", "w": 6.5}, "state": [1.0, 1.0, 0.01]})
+    assert maps.diagram(start, 6.4, 6.6, maps.VALUES[0]).label.shape == (1, maps.VALUES[0])
+    assert maps.diagram(start, 6.4, 6.6, 3).label.shape == (3, 3)
+
+
 @pytest.mark.parametrize(
     ("message", "words"),
     [

@@ -1,4 +1,4 @@
-"""A process that computes for the pages: `python -m udd.app.calculator`.
+"""A process that computes for the pages: `python -m udd.app.calculator KIND`.
 
 It reads questions from its input and writes answers to its output. A question is a pickle of the seconds of
 processor time that it may take, a function of this package and its arguments; None stops the work. An answer
@@ -12,6 +12,7 @@ import os
 import pickle
 import queue
 import struct
+import sys
 import threading
 from typing import Any, BinaryIO
 
@@ -31,6 +32,8 @@ def main() -> None:
     child_process.limit()
     for module in _NEEDED:  # before the first question, which would wait for them
         importlib.import_module(f"{__package__}.{module}")
+    if sys.argv[1:] == ["maps"]:
+        sys.modules[f"{__package__}.maps"].warm_up()
     work = Interruptible()
     questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(source, work, questions), daemon=True).start()

@@ -36,10 +36,13 @@ class Calculators:
     ----------
     budget : limits.Budget
         How many there may be and what a question may take.
+    kind : str
+        What they are asked: ``"runs"``, ``"sections"`` or ``"maps"``, for which they prepare.
     """
 
-    def __init__(self, budget: limits.Budget) -> None:
+    def __init__(self, budget: limits.Budget, kind: str = "runs") -> None:
         self._budget = budget
+        self._kind = kind
         self._usual = min(budget.processes, os.cpu_count() or 1)
         self._allowed = self._usual
         self._slots = asyncio.Semaphore(self._usual)
@@ -72,7 +75,7 @@ class Calculators:
     async def _computed(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, int]:
         """Return the answer and how many bytes it has."""
         async with self._slot():
-            calculator = self._idle.pop() if self._idle else _Calculator()
+            calculator = self._idle.pop() if self._idle else _Calculator(self._kind)
             self._busy.add(calculator)
             try:
                 answer = await calculator.ask((self._budget.seconds, function, arguments))
@@ -92,7 +95,7 @@ class Calculators:
 
     async def prepare(self) -> None:
         """Start a process for the first question."""
-        calculator = _Calculator()
+        calculator = _Calculator(self._kind)
         await calculator.start()
         self._idle.append(calculator)
 
@@ -142,7 +145,8 @@ class Calculators:
 class _Calculator:
     """One process."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str) -> None:
+        self._kind = kind
         self._process: asyncio.subprocess.Process | None = None
         self._loop = asyncio.get_running_loop()
         self._killed = False
@@ -162,7 +166,7 @@ class _Calculator:
         """Start the process, out of reach of the terminal's Ctrl-C: the server ends it."""
         try:
             self._process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-P", "-m", "udd.app.calculator"),
+                *(sys.executable, "-P", "-m", "udd.app.calculator", self._kind),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.DEVNULL,

@@ -13,7 +13,7 @@ from udd.attractors import bifurcation
 from udd.chaos.largest_exponent import lyapunov
 from udd.chaos.poincare_sections import poincare
 from udd.errors import ModelError
-from udd.models import Model, beyond_the_edge
+from udd.models import Disk, Model, beyond_the_edge
 
 from . import limits
 from .page_models import page_model
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 _TRANSIENT = 60  # crossings left out
 VALUES = (20, 60, 300)  # of the drive: a first picture at once, then better ones
+_FIRST_STARTS = 1  # of the first picture: it comes three times as fast
 _KEPT = 40  # points of every orbit in a diagram
 
 
@@ -82,7 +83,13 @@ def starts_of(start: Start) -> Array:
 def diagram(start: Start, low: float, high: float, count: int) -> Diagram:
     """Compute the diagram over so many values of the drive."""
     model, name = beyond_the_edge(start.model), drive_of(start.model)
-    return _diagram(model, name, np.linspace(low, high, count), starts_of(start))
+    starts = starts_of(start)[: _FIRST_STARTS if count == VALUES[0] else None]
+    return _diagram(model, name, np.linspace(low, high, count), starts)
+
+
+def warm_up() -> None:
+    """Compute a small diagram: the first question then waits for no import."""
+    diagram(Start(Disk(0.1), (0.0, 0.001, 0.04, 0.0)), 0.1, 0.101, 2)
 
 
 def exponents(start: Start, low: float, high: float, count: int) -> Exponents:
@@ -99,7 +106,7 @@ def _diagram(model: Model, name: str, values: Array, starts: Array) -> Diagram:
             name,
             values,
             n=_KEPT,
-            transient=2 * _TRANSIENT if len(values) >= VALUES[-1] else _TRANSIENT // 2,
+            transient=_TRANSIENT if len(values) >= VALUES[-1] else _TRANSIENT // 2,
             initial_states=starts,
             max_extension=1 if len(values) == VALUES[0] else 6,  # which takes five times as long
             threads=_worker_threads(),

@@ -62,7 +62,7 @@ def make_app(
         with workspace() as folder:
             # Sections have processes of their own: a diagram takes a hundred times as long.
             budgets = {"runs": limits.RUNS, "sections": limits.MAPS, "maps": limits.MAPS}
-            calculators = {kind: Calculators(budget) for kind, budget in budgets.items()}
+            calculators = {kind: Calculators(budget, kind) for kind, budget in budgets.items()}
             state.update(folder=folder, **calculators, calculators=calculators)
             ready = asyncio.gather(*(c.prepare() for c in calculators.values())) if prepared else None
             try:
