@@ -18,7 +18,7 @@ _REPEATED = [
 
 
 class UddError(ValueError):
-    """Base class of what `udd` raises for bad input.
+    """Base class of all errors that `udd` raises for bad input.
 
     Parameters
     ----------
@@ -34,39 +34,39 @@ class UddError(ValueError):
 
 
 class ModelError(UddError):
-    """A model, an effect, a state or an option of a run cannot be used."""
+    """Error of a model, an effect, a state or an option of a run that cannot be used."""
 
 
 class IntegrationError(UddError):
-    """A run could not go on: the solution blows up, or leaves the model's domain where it must not."""
+    """Error of a run that blows up, or leaves the domain of the model."""
 
 
 class MeasurementError(UddError):
-    """A measurement, or the file it comes from, cannot be used."""
+    """Error of a measurement, or of its file, that cannot be used."""
 
 
 class FitError(UddError):
-    """A measurement cannot be fitted by a model."""
+    """Error of a measurement that a model cannot be fitted to."""
 
 
 class TrackError(UddError):
-    """A film cannot be read, or shows no disk that can be tracked."""
+    """Error of a film that cannot be read, or shows no disk that can be tracked."""
 
 
 class ConvergenceWarning(UserWarning):
-    """A result's error bar does not meet the tolerance asked for."""
+    """Warning that a result's error bar does not meet the tolerance."""
 
 
 class ToleranceWarning(UserWarning):
-    """A component of the state falls below `atol`, grows again, and its error changes what follows."""
+    """Warning that a component of the state below `atol` grows again, with an error that matters."""
 
 
 class StiffnessWarning(UserWarning):
-    """Stability limits the steps of a run, not accuracy: a method for stiff models is faster."""
+    """Warning that stability limits the steps of a run: a method for stiff models is faster."""
 
 
 class IncompleteWarning(UserWarning):
-    """A result is returned without the parts that were not finished.
+    """Warning that a result lacks the parts that were not finished.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class IncompleteWarning(UserWarning):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, with what was computed before it.
+    """Ctrl-C, with the part of the result that was computed before it.
 
     Parameters
     ----------

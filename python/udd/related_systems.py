@@ -45,7 +45,7 @@ __all__ = [
 
 @checked_arguments
 def lorenz(sigma: float = 10.0, r: float = 28.0, b: float = 8 / 3) -> Model:
-    """The Lorenz system, for the state ``[x, y, z]``.
+    """Make the Lorenz system, for the state ``[x, y, z]``.
 
     ::
 
@@ -68,6 +68,7 @@ def lorenz(sigma: float = 10.0, r: float = 28.0, b: float = 8 / 3) -> Model:
     See Also
     --------
     scaled_lorenz : the same in the variables of the DLE.
+    udd.plot.phase_space : draw an orbit.
 
     References
     ----------
@@ -88,7 +89,7 @@ def lorenz(sigma: float = 10.0, r: float = 28.0, b: float = 8 / 3) -> Model:
 
 @checked_arguments
 def scaled_lorenz(w: float, epsilon: float, b: float = 8 / 3) -> Model:
-    """The Lorenz system in the variables of the DLE, for the state ``[omega, y, z]``.
+    """Make the Lorenz system in the variables of the DLE, for the state ``[omega, y, z]``.
 
     ::
 
@@ -112,6 +113,11 @@ def scaled_lorenz(w: float, epsilon: float, b: float = 8 / 3) -> Model:
     ModelError
         A parameter that is not finite.
 
+    See Also
+    --------
+    udd.DLE : its limit without friction.
+    udd.related_systems.lorenz : the original variables.
+
     Notes
     -----
     With ``sigma = 1/epsilon`` and ``r = w sigma^2/b``, Lorenz's variables are ``x = sigma omega``,
@@ -134,7 +140,7 @@ def scaled_lorenz(w: float, epsilon: float, b: float = 8 / 3) -> Model:
 
 @checked_arguments
 def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravity: float = 1.0) -> Model:
-    """Malkus' waterwheel, for the state ``[omega, a, b]``: spin, and the water's sine and cosine parts.
+    """Make Malkus' waterwheel: spin, and the water's sine and cosine parts, ``[omega, a, b]``.
 
     ::
 
@@ -159,6 +165,11 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
     ------
     ModelError
         A parameter that is not finite, or not positive where it must be.
+
+    See Also
+    --------
+    udd.related_systems.lorenz : the same equations.
+    udd.plot.phase_space : draw an orbit.
 
     Notes
     -----
@@ -194,7 +205,7 @@ def waterwheel(inflow: float, leakage: float = 0.0, friction: float = 1.0, gravi
 
 @checked_arguments
 def pendulum(r: float, friction: float = 1.0, torque: float = 0.0) -> Model:
-    """The damped pendulum that the disk is without a drive, for the state ``[v, theta]``.
+    """Make the damped pendulum that the disk is without a drive, for the state ``[v, theta]``.
 
     ::
 
@@ -221,6 +232,7 @@ def pendulum(r: float, friction: float = 1.0, torque: float = 0.0) -> Model:
     See Also
     --------
     udd.Pendulum : a pendulum in SI units, with effects.
+    udd.plot.time_series : draw a run.
 
     Notes
     -----
@@ -239,7 +251,7 @@ def pendulum(r: float, friction: float = 1.0, torque: float = 0.0) -> Model:
 
 @checked_arguments
 def torqued_pendulum(r: float, friction: float, amplitude: float, frequency: float) -> Model:
-    """A pendulum driven by a periodic torque, for the state ``[v, theta]``.
+    """Make a pendulum with a periodic torque, for the state ``[v, theta]``.
 
     ::
 
@@ -260,6 +272,11 @@ def torqued_pendulum(r: float, friction: float, amplitude: float, frequency: flo
     ------
     ModelError
         A parameter that is not finite.
+
+    See Also
+    --------
+    udd.related_systems.shaken_pendulum : driven at its pivot.
+    udd.plot.bifurcation : draw its attractors over a parameter.
 
     References
     ----------
@@ -284,7 +301,7 @@ def torqued_pendulum(r: float, friction: float, amplitude: float, frequency: flo
 
 @checked_arguments
 def shaken_pendulum(r: float, friction: float, amplitude: float, frequency: float) -> Model:
-    """A pendulum whose suspension point moves up and down, for the state ``[v, theta]``.
+    """Make a pendulum whose pivot moves up and down, for the state ``[v, theta]``.
 
     ::
 
@@ -305,6 +322,11 @@ def shaken_pendulum(r: float, friction: float, amplitude: float, frequency: floa
     ------
     ModelError
         A parameter that is not finite.
+
+    See Also
+    --------
+    udd.moved_pendulum : a measured motion of the pivot.
+    udd.related_systems.torqued_pendulum : driven by a torque.
 
     Notes
     -----
@@ -330,7 +352,7 @@ def shaken_pendulum(r: float, friction: float, amplitude: float, frequency: floa
 
 @checked_arguments
 def pumped_pendulum(r: float, friction: float, amplitude: float, frequency: float) -> Model:
-    """A pendulum whose length changes by the clock, for the state ``[v, theta]``.
+    """Make a pendulum whose length changes by the clock, for the state ``[v, theta]``.
 
     ::
 
@@ -351,6 +373,11 @@ def pumped_pendulum(r: float, friction: float, amplitude: float, frequency: floa
     ------
     ModelError
         A parameter that is not finite, or an amplitude of 1 or more, at which the length vanishes.
+
+    See Also
+    --------
+    udd.related_systems.pumped_swing : pumped without a clock.
+    udd.plot.time_series : draw a run.
 
     Notes
     -----
@@ -379,7 +406,7 @@ def pumped_pendulum(r: float, friction: float, amplitude: float, frequency: floa
 def pumped_swing(
     r: float, friction: float = 0.0, depth: float = 0.1, quickness: float = 50.0, sharpness: float = 1e3
 ) -> Model:
-    """A swing that its rider pumps without a clock, for the state ``[v, theta, l]``.
+    """Make a swing that its rider pumps without a clock, for the state ``[v, theta, l]``.
 
     ::
 
@@ -406,6 +433,11 @@ def pumped_swing(
     ------
     ModelError
         A parameter that is not finite or not in its range.
+
+    See Also
+    --------
+    udd.related_systems.pumped_pendulum : pumped by a clock.
+    udd.plot.time_series : draw a run.
 
     Notes
     -----
@@ -442,7 +474,7 @@ def pumped_swing(
 
 @checked_arguments
 def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
-    """Huygens' isochronous pendulum between cycloidal cheeks, for the state ``[v, theta]``.
+    """Make Huygens' isochronous pendulum between cycloidal cheeks, for the state ``[v, theta]``.
 
     ::
 
@@ -461,6 +493,11 @@ def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
     ------
     ModelError
         A parameter that is not finite.
+
+    See Also
+    --------
+    udd.Pendulum : the pendulum on a circle.
+    udd.plot.time_series : draw a run.
 
     Notes
     -----
@@ -484,7 +521,7 @@ def cycloidal_pendulum(r: float, friction: float = 0.0) -> Model:
 
 @checked_arguments
 def walking_droplet(R: float, memory: float = float("inf")) -> Model:
-    """A droplet that walks on the waves of its own bounces, for the state ``[v, y, z]``.
+    """Make a droplet that walks on the waves of its own bounces, for the state ``[v, y, z]``.
 
     ::
 
@@ -505,6 +542,11 @@ def walking_droplet(R: float, memory: float = float("inf")) -> Model:
     ------
     ModelError
         A parameter that is not positive.
+
+    See Also
+    --------
+    udd.DLE : its limit of infinite memory.
+    udd.plot.phase_space : draw an orbit.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Name of before of :mod:`udd.related_systems`; it works for one release more."""
+"""Old name of :mod:`udd.related_systems`; it works for one release more."""
 
 import warnings
 

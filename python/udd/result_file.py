@@ -108,6 +108,10 @@ def save(result: Fit | Discovery, path: str | os.PathLike[str]) -> None:
     UddError
         It is no such result, or the file cannot be written.
 
+    See Also
+    --------
+    udd.load : reads the file.
+
     Examples
     --------
     >>> import numpy as np, pathlib, tempfile, udd
@@ -152,6 +156,10 @@ def load(path: str | os.PathLike[str], *, limit: float = LARGEST) -> Fit | Disco
     ------
     UddError
         There is no such file, it is not whole, not one of these, no regular file, or larger than `limit`.
+
+    See Also
+    --------
+    udd.save : writes the file.
 
     Examples
     --------

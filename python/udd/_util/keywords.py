@@ -48,7 +48,7 @@ def renamed_attribute(old: str, new: str) -> property:
         warnings.warn(text, DeprecationWarning, stacklevel=outside())
         return getattr(self, new)
 
-    return property(read, doc=f"Name of before of `{new}`.")
+    return property(read, doc=f"Old name of `{new}`, which works for one release more.")
 
 
 def with_defaults(function: str, defaults: Options, given: Mapping[str, Any]) -> Options:

@@ -61,7 +61,7 @@ def basins(
     t_max: float | None = None,
     **options: Unpack[RunOptions],
 ) -> xr.Dataset:
-    """Which initial states end on which attractor.
+    """Compute the basins of attraction on a grid of initial states.
 
     Parameters
     ----------
@@ -125,6 +125,12 @@ def basins(
     ToleranceWarning
         A component falls below `atol` and grows again, and an error of `atol` changes what follows.
 
+    See Also
+    --------
+    udd.bifurcation : attractors over a parameter.
+    udd.sweep : grids too large for memory.
+    udd.plot.basins : draw the basins.
+
     Notes
     -----
     Periodic orbits are identified by their section points, aperiodic attractors by overlapping point sets.
@@ -135,8 +141,8 @@ def basins(
 
     The fractions' errors are those of a sample on a grid: binomial where neighbours have nothing in common,
     smaller where the basins are large. With f ~ distance^alpha, the basins' boundary has the dimension of the
-    grid less alpha (Grebogi et al., Phys. Lett. A 99 (1983) 415); initial states without an attractor or a
-    final outcome are left out. The exponent is NaN where too few distances are small enough, as on a coarse
+    grid less alpha (Grebogi et al., Phys. Lett. A 99 (1983) 415 [23]). Initial states without an attractor or
+    a final outcome are left out. The exponent is NaN where too few distances are small enough, as on a coarse
     grid. Where the rates depend on time, every motion begins at time 0 again when it is followed further.
 
     Examples

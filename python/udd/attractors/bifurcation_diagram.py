@@ -147,6 +147,12 @@ def bifurcation(
     IncompleteWarning
         After Ctrl-C, where a partial result was asked for.
 
+    See Also
+    --------
+    udd.diagram : the same with branches and their bifurcations.
+    udd.basins : which start ends where.
+    udd.plot.bifurcation : draw the section points.
+
     Notes
     -----
     The exponents of a short further run classify what is not periodic. A chaotic transient that outlives the

@@ -86,7 +86,7 @@ def lyapunov(
     progress: bool | Callable[[str], object] | None = None,
     with_error: bool = False,
 ) -> Any:
-    """The largest Lyapunov exponent: the mean rate at which neighbouring orbits part.
+    """Compute the largest Lyapunov exponent: the mean rate at which neighbouring orbits separate.
 
     Parameters
     ----------
@@ -145,10 +145,16 @@ def lyapunov(
         A component falls below `atol` and grows again, and an error of `atol` changes what follows; some of
         many orbits are checked.
 
+    See Also
+    --------
+    udd.lyapunov_spectrum : all exponents and a verdict.
+    udd.sweep : grids too large for memory.
+    udd.plot.exponents : draw exponents over a parameter.
+
     Notes
     -----
     The tangent vector is the derivative part of a run over dual numbers, kept at length 1
-    (Benettin et al., Meccanica 15 (1980) 9). The Taylor method advances many orbits at once. The
+    (Benettin et al., Meccanica 15 (1980) 9 [20]). The Taylor method advances many orbits at once. The
     exponent is that of the orbit from `state0`: a transient longer than `t`, as near w = 4.5, is not seen as
     one. See :func:`udd.lyapunov_spectrum` for a verdict. Drives are taken in portions, so that memory hardly
     grows beyond the result.

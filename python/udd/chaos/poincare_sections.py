@@ -70,6 +70,12 @@ class Section(Drawable):
         The time of that.
     model : Model
         What was run, before parameters were varied.
+
+    See Also
+    --------
+    udd.poincare : makes it.
+    udd.plot.poincare : draw the points.
+    udd.plot.return_map : draw the return map.
     """
 
     t: _Floats
@@ -92,7 +98,17 @@ class Section(Drawable):
 
     @checked_arguments
     def component(self, name: str) -> _Floats:
-        """One component of the points, shape (..., n).
+        """Return one component of the points.
+
+        Parameters
+        ----------
+        name : str
+            A state of the model, such as ``"Omega"``.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            In the unit of the state.
 
         Raises
         ------
@@ -106,7 +122,7 @@ class Section(Drawable):
 
     @checked_arguments
     def of(self, which: int) -> Section:
-        """The crossings of one of several surfaces.
+        """Return the crossings of one of several surfaces.
 
         Parameters
         ----------
@@ -140,7 +156,7 @@ class Section(Drawable):
 
     @checked_arguments
     def return_map(self, component: str) -> tuple[_Floats, _Floats]:
-        """Each crossing beside the next one.
+        """Pair each crossing with the next one.
 
         Parameters
         ----------
@@ -162,7 +178,7 @@ class Section(Drawable):
 
     @checked_arguments
     def cusp_map(self, component: str | None = None) -> tuple[_Floats, _Floats]:
-        """Lorenz's map: each maximum beside the next one.
+        """Pair each maximum with the next one: Lorenz's map [2].
 
         It is made of the orbits from the first points of this section, followed from maximum to maximum.
 
@@ -192,7 +208,7 @@ class Section(Drawable):
         return maxima.return_map(name)
 
     def to_xarray(self) -> xr.Dataset:
-        """The points as labelled arrays: ``t``, ``which`` and every state, over the orbits and ``crossing``.
+        """Return labelled arrays: ``t``, ``which`` and every state, over the orbits and ``crossing``.
 
         Returns
         -------
@@ -241,7 +257,7 @@ def poincare(
     t_max: float | None = None,
     **options: Unpack[RunOptions],
 ) -> Section:
-    """Crossings of a surface along orbits: a Poincaré section.
+    """Compute a Poincaré section: the crossings of a surface along orbits.
 
     Parameters
     ----------
@@ -279,6 +295,8 @@ def poincare(
     Returns
     -------
     Section
+        Fields ``t``, ``state``, ``which``, ``found`` and ``outcome``; each component by
+        :meth:`Section.component`.
 
     Raises
     ------
@@ -299,12 +317,23 @@ def poincare(
         A component falls below `atol` and grows again, and an error of `atol` changes what follows; some of
         many orbits are checked.
 
+    See Also
+    --------
+    udd.bifurcation : section points over a parameter.
+    udd.periodic_orbit : the cycle near a point.
+    udd.plot.poincare : draw the points.
+    udd.plot.return_map : draw each point over the one before.
+
     Notes
     -----
     The Taylor method's polynomials are as accurate as its steps; a crossing is a zero of the expression on
     such a polynomial. Where the expression may have several zeros, interval arithmetic
     divides the step until each part has at most one, however fast the expression changes. A surface that is
     only touched is not crossed. A smooth pulse of the law that is shorter than a step may need ``max_step``.
+
+    References
+    ----------
+    Interval arithmetic: R. E. Moore [15]. Zeros: N. Anderson and Å. Björck [14].
 
     Examples
     --------

@@ -48,7 +48,7 @@ _FAR = 1e6  # times its start, or from 0: a run that fails there has gone to inf
 
 @dataclass(frozen=True, eq=False)
 class Spectrum(Drawable):
-    """The Lyapunov exponents of an orbit.
+    """Lyapunov exponents of an orbit.
 
     Attributes
     ----------
@@ -85,6 +85,12 @@ class Spectrum(Drawable):
         What was run.
     section : Section or None
         Where the orbit crosses a surface from its last state on, if that was asked for.
+
+    See Also
+    --------
+    udd.lyapunov_spectrum : makes it.
+    udd.plot.spectrum : draw one spectrum.
+    udd.plot.exponents : draw several over a parameter.
     """
 
     exponents: _Floats
@@ -101,7 +107,7 @@ class Spectrum(Drawable):
     section: Section | None = None
 
     def to_xarray(self) -> xr.Dataset:
-        """The exponents with their standard errors over ``number``, and all the rest as attributes.
+        """Return labelled arrays: exponents with standard errors over ``number``; attributes for the rest.
 
         Returns
         -------
@@ -135,7 +141,7 @@ def lyapunov_spectrum(
     atol: float = 1e-12,
     max_step: float | None = None,
 ) -> Spectrum:
-    """All Lyapunov exponents of an orbit, and a verdict on its motion.
+    """Compute all Lyapunov exponents of an orbit, and classify its motion.
 
     Parameters
     ----------
@@ -163,6 +169,7 @@ def lyapunov_spectrum(
     Returns
     -------
     Spectrum
+        Fields ``exponents``, ``standard_errors``, ``dimension``, ``verdict``, ``period``, ``invariants``.
 
     Raises
     ------
@@ -182,6 +189,12 @@ def lyapunov_spectrum(
     IncompleteWarning
         Where the orbit does not cross the `section` so often, as at rest, or on Ctrl-C meanwhile.
 
+    See Also
+    --------
+    udd.lyapunov : the largest exponent, of many orbits.
+    udd.covariant_vectors : directions of growth.
+    udd.plot.spectrum : draw the exponents.
+
     Notes
     -----
     Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
@@ -189,6 +202,10 @@ def lyapunov_spectrum(
     all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there
     slowly, the exponents are taken again from what it has settled on. Longer transients are not seen as such:
     their mean is 8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
+
+    References
+    ----------
+    QR method: G. Benettin et al. [20]. Dimension: J. L. Kaplan and J. A. Yorke [21].
 
     Examples
     --------
@@ -401,7 +418,7 @@ def _invariants(model: Model, exponents: _Floats, mean: _Floats, product: _Float
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Covariant(Drawable, OneLine):
-    """The covariant Lyapunov vectors along an orbit, and the exponents of finite times.
+    """Covariant Lyapunov vectors along an orbit, with the exponents of finite times.
 
     Attributes
     ----------
@@ -415,6 +432,11 @@ class Covariant(Drawable, OneLine):
     local_exponents : ndarray, shape (n, dim)
         The mean growth rates of the orthonormal frame in each interval: the exponents of finite time,
         whose mean over all intervals is the spectrum.
+
+    See Also
+    --------
+    udd.covariant_vectors : makes it.
+    udd.plot.spectrum : draw the finite-time exponents.
     """
 
     t: _Floats
@@ -442,7 +464,7 @@ def covariant_vectors(
     atol: float = 1e-12,
     max_step: float | None = None,
 ) -> Covariant:
-    """Covariant Lyapunov vectors and finite-time exponents along an orbit.
+    """Compute covariant Lyapunov vectors and finite-time exponents along an orbit.
 
     Parameters
     ----------
@@ -465,6 +487,7 @@ def covariant_vectors(
     Returns
     -------
     Covariant
+        Fields ``t``, ``state``, ``vectors``, ``local_exponents`` and ``angles``.
 
     Raises
     ------
@@ -475,10 +498,16 @@ def covariant_vectors(
     MemoryError
         There is no room for so many intervals: `n` of them and twice the `transient`, each of length `dt`.
 
+    See Also
+    --------
+    udd.lyapunov_spectrum : the exponents alone.
+    udd.plot.spectrum : draw the finite-time exponents.
+
     Notes
     -----
-    The method is that of F. Ginelli et al., Physical Review Letters 99 (2007) 130601: forwards the frame is
-    made orthonormal after each interval, backwards vectors inside it converge to the covariant ones.
+    The method is that of F. Ginelli et al., Physical Review Letters 99 (2007) 130601 [22]. Forwards in time
+    the frame is made orthonormal after each interval. Backwards the vectors inside it converge to the
+    covariant ones.
 
     Examples
     --------

@@ -44,7 +44,7 @@ def _constructor(spec: Spec) -> Callable[..., Effect]:
     def make(*, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
         return spec.make(momentum=momentum, treatment=treatment, **values)
 
-    lines = [f"{spec.title[0].upper()}{spec.title[1:]}: ``{spec.equation}``.", ""]
+    lines = [f"Make the effect {spec.title}: ``{spec.equation}``.", ""]
     lines += [f"{spec.meaning[0].upper()}{spec.meaning[1:]}.", "", "Parameters", "----------"]
     for p in spec.parameters:
         low, high = p.range
@@ -59,7 +59,14 @@ def _constructor(spec: Spec) -> Callable[..., Effect]:
             f"treatment : {{{', '.join(map(repr, spec.treatments))}}}",
             "    Treatment of the friction at rest.",
         ]
-    lines += ["", "Returns", "-------", "Effect"]
+    lines += ["", "Returns", "-------", "Effect", "    With these values."]
+    lines += [
+        "",
+        "See Also",
+        "--------",
+        "udd.effects.library : all effects.",
+        "udd.discover : effects that a model lacks.",
+    ]
     make.__name__ = make.__qualname__ = spec.name
     make.__doc__ = "\n".join(lines)
     make.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]

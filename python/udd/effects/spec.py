@@ -25,7 +25,7 @@ _SIGNS = {"set-valued": "Sgn(Omega)", "karnopp": "Karnopp(Omega, eps)", "lugre":
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect.
+    """Parameter of an effect.
 
     Attributes
     ----------
@@ -43,6 +43,10 @@ class Parameter:
         Values of a shape that a scan of candidates tries.
     along : str
         Kind of a scanned number: ``"angle"``, ``"speed"``, ``"power"`` or ``"duration"``.
+
+    See Also
+    --------
+    udd.effects.library : effects with their parameters.
     """
 
     name: str
@@ -63,7 +67,27 @@ class Parameter:
         return True
 
     def check(self, effect: str, value: object, *, strict: bool) -> float:
-        """Return the value as a float, within the range; amplitudes may exceed it unless `strict`."""
+        """Return the value as a float if it is within the range.
+
+        Parameters
+        ----------
+        effect : str
+            Name of the effect, for the message.
+        value : object
+            The value.
+        strict : bool
+            If False, amplitudes may exceed the range.
+
+        Returns
+        -------
+        float
+            The value.
+
+        Raises
+        ------
+        ModelError
+            The value is no number or outside the range.
+        """
         result = number(f"{self.name} of {effect}", value)
         low, high = self.range
         if (strict or self.role != "amplitude") and not low <= result <= high:
@@ -100,6 +124,11 @@ class Spec:
         :func:`udd.simulate` only. Empty for effects other than dry friction.
     parameters : tuple of Parameter
         In the order of the formula.
+
+    See Also
+    --------
+    udd.effects.library : all specifications.
+    udd.effects.formula : an effect from a formula.
     """
 
     name: str
@@ -118,7 +147,21 @@ class Spec:
         return any(p.sought and p.role in ("shape", "scanned") for p in self.parameters)
 
     def make(self, *, momentum: str | None = None, treatment: str | None = None, **values: float) -> Effect:
-        """Make the effect with these parameter values; the others take their defaults.
+        """Make the effect with these parameter values.
+
+        Parameters
+        ----------
+        momentum : str, optional
+            One of `momenta`; by default the first.
+        treatment : str, optional
+            One of `treatments`; by default the first.
+        **values : float
+            Parameter values by name; the others take their defaults.
+
+        Returns
+        -------
+        Effect
+            Checked.
 
         Raises
         ------
@@ -141,7 +184,20 @@ class Spec:
     own = renamed_attribute("own", "core_formula")
 
     def expression(self, values: Mapping[str, float], equation: str) -> str:
-        """Return the equation with these numbers inserted."""
+        """Return the equation with these numbers inserted.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Parameter values.
+        equation : str
+            The formula.
+
+        Returns
+        -------
+        str
+            The formula with numbers.
+        """
 
         def put(match: re.Match[str]) -> str:
             value = values[match[0]]
@@ -152,7 +208,20 @@ class Spec:
         return left + equals + (re.sub(rf"(?<!\w)(?:{names})(?!\w)", put, right) if names else right)
 
     def call(self, effect: Effect) -> tuple[str, list[str]]:
-        """Return the name of the function that makes the effect, and its arguments as text."""
+        """Return the name of the function that makes the effect, and its arguments as text.
+
+        Parameters
+        ----------
+        effect : Effect
+            An effect of this specification.
+
+        Returns
+        -------
+        name : str
+            Name of the constructor.
+        arguments : list of str
+            Every parameter with its value, as ``name=value``.
+        """
         return self.name, [f"{name}={value!r}" for name, value in effect.parameters.items()]
 
 
@@ -175,6 +244,16 @@ def _specs() -> Mapping[str, Spec]:
 
 def library() -> tuple[Spec, ...]:
     """List all effects of the library.
+
+    Returns
+    -------
+    tuple of Spec
+        Fields ``name``, ``title``, ``equation``, ``meaning``, ``slots`` and ``parameters``.
+
+    See Also
+    --------
+    udd.effects.formula : an effect from a formula.
+    udd.discover : which effects a model lacks.
 
     Examples
     --------
@@ -310,6 +389,16 @@ class Effect:
 
     def replace(self, **values: float) -> Effect:
         """Return the effect with other values of some parameters.
+
+        Parameters
+        ----------
+        **values : float
+            New values by name.
+
+        Returns
+        -------
+        Effect
+            The same effect with these values.
 
         Raises
         ------

@@ -37,6 +37,11 @@ def path(name: str) -> Path:
     UddError
         No example has that name.
 
+    See Also
+    --------
+    udd.examples.write : copies an example into a folder.
+    udd.read_measurement : reads a table.
+
     Examples
     --------
     >>> import udd
@@ -68,6 +73,10 @@ def write(name: str, folder: str | os.PathLike[str] = ".") -> list[Path]:
     ------
     UddError
         No example has that name, or the folder cannot be written to.
+
+    See Also
+    --------
+    udd.examples.path : path of a single file.
 
     Examples
     --------

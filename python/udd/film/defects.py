@@ -78,6 +78,10 @@ class Defects:
         Times in s, by the film's own clock, from which on the motion is shown slower than the stamps say, and
         by which factor.
 
+    See Also
+    --------
+    udd.render : takes them.
+
     Examples
     --------
     >>> import math, udd
@@ -142,17 +146,17 @@ class Defects:
 
     @property
     def bends(self) -> bool:
-        """Whether the picture is not a true-to-scale one of the disk's plane."""
+        """True if the picture is not a true-to-scale one of the disk's plane."""
         return bool(self.lens) or any(self.off_axis)
 
     @property
     def lights(self) -> bool:
-        """Whether the light is uneven in space or in time."""
+        """True if the light is uneven in space or in time."""
         return bool(self.gradient or self.flicker or len(self.gains))
 
     @property
     def moves(self) -> bool:
-        """Whether the camera moves or zooms."""
+        """True if the camera moves or zooms."""
         return bool(self.shake or len(self.bumps) or len(self.zooms))
 
     def __repr__(self) -> str:

@@ -37,7 +37,7 @@ _COARSE = 0.25  # pixels
 
 @dataclass(frozen=True, repr=False)
 class Film(Drawable):
-    """A film and what it shows.
+    """Rendered film, with the motion that it shows.
 
     Attributes
     ----------
@@ -58,6 +58,12 @@ class Film(Drawable):
         Pixel (x, y) at which the wheels hold the disk; the centre of the top left pixel is (0, 0).
     radius : float
         Radius of the disk, m.
+
+    See Also
+    --------
+    udd.render : makes it.
+    udd.track : measures it.
+    udd.plot.overlay : draw the fitted disk into a frame.
     """
 
     path: Path
@@ -101,7 +107,7 @@ def render(
     progress: bool | Callable[[str], object] | None = None,
     **camera: Unpack[CameraOptions],
 ) -> Film:
-    """Film a simulated run: what a camera before the device would see.
+    """Render a simulated run as a film, as a camera in front of the device would see it.
 
     A white disk with four square marks (side R/5, centres 65/80 R from the disk's centre; clockwise red,
     orange, blue, green, with red at the angle beta) hangs between two wheels, before a wall. The support is
@@ -160,6 +166,12 @@ def render(
         For a trajectory that is empty, not finite or too coarsely sampled, an exposure longer than a frame, a
         place that cannot be written to, any other value out of its range, or without the extra ``track``.
         Nothing is left behind then.
+
+    See Also
+    --------
+    udd.track : measures the film.
+    udd.film.Defects : faults of scene and camera.
+    udd.plot.overlay : draw the fitted disk into a frame.
 
     Examples
     --------

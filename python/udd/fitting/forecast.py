@@ -121,7 +121,13 @@ class Forecast(Drawable):
         return self.valid_time / self.lyapunov_time if math.isfinite(self.lyapunov_time) else math.nan
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the forecast as JSON-ready values."""
+        """Return the forecast as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         curves = {key: getattr(self, key) for key in ("median", "low", "high")}
         return {
             "start_s": self.start,

@@ -238,7 +238,13 @@ class Fit(Drawable):
     faults = renamed_attribute("faults", "film_error_chi2")
 
     def without_cache(self) -> Fit:
-        """Return the fit without its solve's linearisation, which takes about 1.5 kB a frame."""
+        """Return the fit without its solve's linearisation, which takes about 1.5 kB a frame.
+
+        Returns
+        -------
+        Fit
+            With the same numbers.
+        """
         return replace(self, point=self.point.without_cache())
 
     def inflation(self, before: Fit) -> float:
@@ -246,6 +252,16 @@ class Fit(Drawable):
 
         It is the remaining scatter times the misfits' excess power at the frequencies in which the two fits
         differ.
+
+        Parameters
+        ----------
+        before : Fit
+            Fit of the smaller model to the same record.
+
+        Returns
+        -------
+        float
+            The factor.
         """
         return max(self.scatter, 1.0) * self._colour(before)
 
@@ -270,7 +286,13 @@ class Fit(Drawable):
         return doubts(self)
 
     def with_diagnostics(self) -> Fit:
-        """Return the fit with standard errors that include missing physics, see :class:`Diagnostics`."""
+        """Return the fit with standard errors that include missing physics.
+
+        Returns
+        -------
+        Fit
+            With errors and covariance inflated by the factor of its :class:`Diagnostics`.
+        """
         factor = self.doubts.factor / self.widened
         if factor == 1.0:
             return self
@@ -283,13 +305,36 @@ class Fit(Drawable):
     @renamed(held="fixed")
     @checked_arguments(error=FitError)
     def budget(self, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
-        """Compute the GUM uncertainty budget of the parameters, see :mod:`udd.fitting.uncertainty_budget`."""
+        """Compute the GUM uncertainty budget of the parameters.
+
+        Parameters
+        ----------
+        fixed : mapping of str to float, optional
+            Standard uncertainties of the fixed parameters.
+        k : float
+            The coverage factor.
+
+        Returns
+        -------
+        Budget
+            Uncertainty of each parameter by source.
+
+        See Also
+        --------
+        udd.fitting.uncertainty_budget.budget : explains the arguments.
+        """
         from .uncertainty_budget import budget
 
         return budget(self, fixed, k)
 
     def summary(self) -> str:
-        """Summarise the fit on one screen: its diagnostics, and every parameter with its unit."""
+        """Summarise the fit on one screen: its diagnostics, and every parameter with its unit.
+
+        Returns
+        -------
+        str
+            Text with several lines.
+        """
         head = "parameters, with the standard error of the last digits in brackets:"
         return "\n".join([self._state, *self.doubts.sentences, head, *self._table()])
 
@@ -328,11 +373,23 @@ class Fit(Drawable):
         return f"{head}<ul>{items}</ul><pre>{table}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return parameters with errors, noise, goodness of fit and diagnostics as JSON-ready values."""
+        """Return parameters with errors, noise, goodness of fit and diagnostics as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return self.numbers() | {"doubts": self.doubts.to_dict()}
 
     def numbers(self) -> dict[str, Any]:
-        """Return parameters with errors, noise and goodness of fit as JSON-ready values."""
+        """Return parameters with errors, noise and goodness of fit as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "model": repr(self.model),
             "parameters": {n: {"value": v, "se": self.errors[n]} for n, v in self.parameters.items()},

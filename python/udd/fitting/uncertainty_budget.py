@@ -73,7 +73,13 @@ class Budget(OneLine):
         return result
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the budget as JSON-ready values."""
+        """Return the budget as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "k": self.k,
             "budget": {
@@ -125,6 +131,11 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
     ------
     FitError
         A name is not a parameter of the model, or was free; or an uncertainty is not positive.
+
+    See Also
+    --------
+    udd.Fit.budget : the same as a method.
+    udd.input_bias : bias by noisy inputs.
 
     Notes
     -----

@@ -21,7 +21,7 @@ Hold = Literal["zero", "linear", "cubic"]
 
 @dataclass(frozen=True, eq=False)
 class InputSignal(Drawable):
-    """A measured input (exogenous signal): samples, and how it runs between them.
+    """Measured input (exogenous signal): samples, and the law between them.
 
     Parameters
     ----------
@@ -37,6 +37,12 @@ class InputSignal(Drawable):
     ------
     MeasurementError
         Times that do not increase, samples that are not finite, lengths that differ, an unknown hold.
+
+    See Also
+    --------
+    udd.simulate : runs a model with inputs.
+    udd.input_bias : the effect of its noise on a fit.
+    udd.plot.input_signal : draw the signal.
 
     Examples
     --------
@@ -80,11 +86,27 @@ class InputSignal(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def shifted(self, by: float) -> InputSignal:
-        """Return the same signal, delayed by `by` [s]."""
+        """Return the same signal, delayed.
+
+        Parameters
+        ----------
+        by : float
+            Delay [s].
+
+        Returns
+        -------
+        InputSignal
+            With the same samples at later times.
+        """
         return InputSignal(self.t + by, self.values, self.hold)
 
     def rate(self) -> InputSignal:
-        """Compute its derivative [per s]: steps for straight lines, a spline for a cubic spline.
+        """Compute the derivative: steps for straight lines, a spline for a cubic spline.
+
+        Returns
+        -------
+        InputSignal
+            In the signal's unit per second.
 
         Raises
         ------
@@ -107,14 +129,29 @@ class InputSignal(Drawable):
         return InputSignal(self.t, np.append(slopes, end), "zero" if self.hold == "linear" else "cubic")
 
     def lacks(self, start: float, end: float, slack: float, whose: str) -> str:
-        """Say that it does not cover a span of time, up to `slack` at both ends; empty if it does."""
+        """Describe the part of a span of time that the signal does not cover.
+
+        Parameters
+        ----------
+        start, end : float
+            The span [s].
+        slack : float
+            Time that may be missing at both ends [s].
+        whose : str
+            Name of the span in the sentence.
+
+        Returns
+        -------
+        str
+            Empty if the signal covers the span.
+        """
         first, last = self.span
         if first - slack <= start and end <= last + slack:
             return ""
         return f"is known from t = {first:g} to {last:g}, but the {whose} goes from {start:g} to {end:g}"
 
     def coefficients(self) -> NDArray[np.float64]:
-        """The polynomial between each two samples, over the time since the first of them.
+        """Return the polynomial between each two samples, over the time since the first of them.
 
         Returns
         -------

@@ -101,6 +101,12 @@ def read_measurement(
         refers to other files (HDF5). A column is missing, or a cell is not a number. Times do not increase,
         a value is infinite, a sigma is not positive, or there are too few usable rows.
 
+    See Also
+    --------
+    udd.track : measures a film.
+    udd.fit : fits a model to the record.
+    udd.plot.time_series : draw the columns.
+
     Examples
     --------
     >>> import pathlib, tempfile

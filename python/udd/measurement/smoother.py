@@ -47,7 +47,7 @@ class _Stretch:
 def smooth(
     measurement: Measurement, *, gap: float = 0.1, slip: float | None = None, angles: Collection[str] = ()
 ) -> Measurement:
-    """Average the noise of a measurement over neighbouring rows, and say how much is left.
+    """Smooth a measurement over neighbouring rows, and estimate the remaining noise.
 
     Parameters
     ----------
@@ -78,12 +78,18 @@ def smooth(
     ModelError
         `gap` or `slip` is not a positive number.
 
+    See Also
+    --------
+    udd.fit : takes the record without smoothing.
+    udd.plot.time_series : draw the columns.
+
     Notes
     -----
     Every coordinate has a position, a rate and an acceleration that white jerk drives. The strength of the
-    jerk has the highest likelihood (Kalman filter, Rauch, Tung and Striebel, AIAA J. 3, 1965). The errors of
-    neighbouring rows are correlated afterwards: fit and discover with the original record, and never test a
-    record for slip that was smoothed with `slip`.
+    jerk has the highest likelihood (Kalman filter, Rauch, Tung and Striebel, AIAA J. 3, 1965 [41]).
+
+    The errors of neighbouring rows are correlated afterwards: fit and discover with the original record, and
+    never test a record for slip that was smoothed with `slip`.
 
     Examples
     --------

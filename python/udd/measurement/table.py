@@ -34,7 +34,7 @@ SHORTEST = 10  # rows; with fewer there are no more data than unknowns in any mo
 
 @dataclass(frozen=True, eq=False)
 class Measurement(Drawable):
-    """A measured motion: of a disk or a pendulum as a camera saw it, or of a user's own model.
+    """Measured motion of a disk, of a pendulum, or of a user's own model.
 
     Parameters
     ----------
@@ -72,6 +72,13 @@ class Measurement(Drawable):
     MeasurementError
         Times not increasing or duplicate, infinite values, sigma not positive, shapes that differ; an input
         that is no signal, or has the name of a column.
+
+    See Also
+    --------
+    udd.read_measurement : reads a file.
+    udd.track : measures a film.
+    udd.fit : fits a model to it.
+    udd.plot.time_series : draw the columns.
 
     Examples
     --------
@@ -204,7 +211,12 @@ class Measurement(Drawable):
         return table[:, self.names.index(column)]
 
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of each row, shape (n, m, m), in the units of `values` squared.
+        """Return the covariance matrix of each row.
+
+        Returns
+        -------
+        ndarray, shape (n, m, m)
+            In the units of `values` squared.
 
         Raises
         ------
@@ -222,12 +234,34 @@ class Measurement(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def slice(self, t0: float, t1: float) -> Measurement:
-        """Rows with ``t0 <= t < t1`` [s]; the times keep their origin, and inputs are whole."""
+        """Return the rows of a span of time.
+
+        Parameters
+        ----------
+        t0, t1 : float
+            The rows with ``t0 <= t < t1`` are returned [s].
+
+        Returns
+        -------
+        Measurement
+            The times keep their origin, and the inputs stay whole.
+        """
         return self.rows((self.t >= t0) & (self.t < t1))
 
     @checked_arguments(error=MeasurementError)
     def rows(self, mask: ArrayLike) -> Measurement:
-        """Rows that a boolean mask or an index array picks; inputs are whole."""
+        """Return the rows that a mask or an index array picks.
+
+        Parameters
+        ----------
+        mask : array_like of bool or int, shape (n,) or (k,)
+            A boolean for each row, or row numbers.
+
+        Returns
+        -------
+        Measurement
+            The inputs stay whole.
+        """
         pick = np.asarray(mask)
         try:
             self.t[pick]
@@ -248,7 +282,7 @@ class Measurement(Drawable):
         )
 
     def to_xarray(self) -> xr.Dataset:
-        """The measurement as labelled arrays: columns, their ``sigma_...``, ``flag`` and inputs over ``t``.
+        """Return labelled arrays over ``t``: columns, their ``sigma_...``, ``flag`` and inputs.
 
         An input that was sampled at other times than `t` lies over times of its own, ``t_<name>``.
 
@@ -289,7 +323,17 @@ class Measurement(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def on_rows(self, name: str) -> bool:
-        """Return True if an input was sampled at the times of the rows."""
+        """Return True if an input was sampled at the times of the rows.
+
+        Parameters
+        ----------
+        name : str
+            Name of an input.
+
+        Returns
+        -------
+        bool
+        """
         if name not in self.inputs:
             known = ", ".join(self.inputs) or "no inputs"
             raise MeasurementError(f"nothing that drives it is called {name!r:.80}; there are {known}")
@@ -302,7 +346,18 @@ class Measurement(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def with_meta(self, **changes: Any) -> Measurement:
-        """The same rows with entries of `meta` replaced or added."""
+        """Return the same rows with entries of `meta` replaced or added.
+
+        Parameters
+        ----------
+        **changes
+            Entries by name.
+
+        Returns
+        -------
+        Measurement
+            With the changed `meta`.
+        """
         return replace(self, meta={**self.meta, **changes})
 
     @checked_arguments(error=MeasurementError)
@@ -310,6 +365,11 @@ class Measurement(Drawable):
         """Write the file format of the package; a reader gets the same bits back.
 
         The file appears complete or not at all.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
         """
         from .write import to_csv
 
@@ -317,7 +377,13 @@ class Measurement(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
-        """Write the same table as Parquet (needs pyarrow)."""
+        """Write the same table as Parquet (needs pyarrow).
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        """
         from .write import to_parquet
 
         to_parquet(self, path)

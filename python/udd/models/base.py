@@ -78,6 +78,12 @@ class Model:
         A name that a formula may not use, a state without an equation, a value that is not finite, a mass
         matrix that is not symmetric and positive definite.
 
+    See Also
+    --------
+    udd.mechanism : a model from a mass matrix and forces.
+    udd.related_systems : predefined models.
+    udd.fit : estimate the parameters from data.
+
     Notes
     -----
     The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
@@ -188,6 +194,11 @@ class Model:
             Any of :attr:`parameters`. As on the way of a fit, friction, drive and amplitudes may leave their
             physical ranges; sizes must stay positive and everything finite.
 
+        Returns
+        -------
+        Model
+            Of the same class.
+
         Raises
         ------
         ModelError
@@ -217,6 +228,16 @@ class Model:
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
         """Return the model with these effects instead of its present ones.
+
+        Parameters
+        ----------
+        effects : iterable of Effect
+            All effects of the new model; an empty list removes them.
+
+        Returns
+        -------
+        Model
+            Of the same class.
 
         Raises
         ------
@@ -317,6 +338,11 @@ class Model:
         ----------
         **changes
             Arguments of the constructor, or parameters of effects as in ``**{"relaxation.b": 5.0}``.
+
+        Returns
+        -------
+        Model
+            Of the same class.
 
         Raises
         ------

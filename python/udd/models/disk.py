@@ -66,6 +66,13 @@ class Disk(CompiledModel):
     ModelError
         A parameter that is not finite or has the wrong sign, an effect given twice.
 
+    See Also
+    --------
+    udd.DLE : the dimensionless equations.
+    udd.driven_disk : a disk with a measured drive.
+    udd.effects.library : the effects that a disk may have.
+    udd.plot.geometry : draw the device and its coordinates.
+
     References
     ----------
     L. Maas, "The upward-driven disk, a steadily forced chaotic pendulum" [1]: the full model, with its
@@ -106,6 +113,11 @@ class Disk(CompiledModel):
             Its radius [m], positive; the paper's has 3 cm.
         **options
             Of the constructor: ``R``, ``g``, ``k0``, ``k1``, ``k2``, ``effects``, ``edge``.
+
+        Returns
+        -------
+        Disk
+            With the drive ``W = rate wheel`` [m/s].
 
         Raises
         ------

@@ -39,10 +39,20 @@ class DLE(CompiledModel):
     ModelError
         A parameter that is negative or not finite.
 
+    See Also
+    --------
+    udd.Disk : the disk with its dimensions.
+    udd.related_systems.scaled_lorenz : the Lorenz system in these variables.
+    udd.plot.phase_space : draw an orbit.
+
     Notes
     -----
     With ``L = 2 k0^2/(g R^2)`` and ``tau = R^2/(2 k0)`` the disk has ``w = tau W/L``. Time averages on every
     bounded orbit are exact: ``<omega y> = <omega^2> = w`` and ``<z> = 0`` for ``B = 0``.
+
+    References
+    ----------
+    L. Maas, "The upward-driven disk, a steadily forced chaotic pendulum" [1].
 
     Examples
     --------
@@ -66,7 +76,23 @@ class DLE(CompiledModel):
         object.__setattr__(self, "B", number("B", self.B, least=0.0))
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:
-        """Refuse effects: the dimensionless equations have none; use :class:`Disk`."""
+        """Refuse effects: the dimensionless equations have none.
+
+        Parameters
+        ----------
+        effects : iterable of Effect
+            Must be empty.
+
+        Returns
+        -------
+        DLE
+            The model itself.
+
+        Raises
+        ------
+        ModelError
+            There are effects; use :class:`Disk`.
+        """
         if tuple(effects):
             raise ModelError("the dimensionless equations take no effects; use udd.Disk")
         return self

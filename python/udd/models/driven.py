@@ -14,7 +14,7 @@ __all__ = ["driven_disk", "moved_pendulum"]
 def driven_disk(
     R: float = 0.06, *, k0: float = 0.0, k1: float = 0.0, k2: float = 0.0, g: float = 9.81
 ) -> FormulaModel:
-    """The disk with a measured drive W(t), as a model with the inputs ``W`` [m/s] and ``W_rate`` [m/s^2].
+    """Make a disk with a measured drive W(t): inputs ``W`` [m/s] and ``W_rate`` [m/s^2].
 
     ::
 
@@ -43,6 +43,12 @@ def driven_disk(
     ModelError
         A number that is not finite, a radius that is not positive.
 
+    See Also
+    --------
+    udd.Disk : the disk with a constant drive.
+    udd.InputSignal : a measured signal.
+    udd.plot.input_signal : draw the signal.
+
     Examples
     --------
     >>> import udd
@@ -69,7 +75,7 @@ def driven_disk(
 def moved_pendulum(
     length: float, *, inertia: float | None = None, k0: float = 0.0, g: float = 9.81
 ) -> FormulaModel:
-    """A pendulum whose pivot is moved, with its measured acceleration as the inputs ``ax, az`` [m/s^2].
+    """Make a pendulum with a moving pivot: inputs ``ax, az`` [m/s^2], its measured acceleration.
 
     ::
 
@@ -99,6 +105,12 @@ def moved_pendulum(
     ------
     ModelError
         A number that is not finite, a length or an inertia that is not positive.
+
+    See Also
+    --------
+    udd.Pendulum : the pendulum with a fixed pivot.
+    udd.InputSignal : a measured signal.
+    udd.plot.input_signal : draw the signal.
 
     Examples
     --------

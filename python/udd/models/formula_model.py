@@ -73,6 +73,12 @@ class FormulaModel(Model, written=True):
         The measured inputs, record by record; empty until :meth:`with_inputs`.
     record : int
         The number of the record that :meth:`rates` and runs follow.
+
+    See Also
+    --------
+    udd.Model : makes these models and documents the arguments.
+    udd.fit : estimate the parameters.
+    udd.plot.time_series : draw a run.
     """
 
     kind: ClassVar[str] = "own"
@@ -244,7 +250,7 @@ class FormulaModel(Model, written=True):
 
     @checked_arguments
     def mass_matrix(self, states: ArrayLike) -> NDArray[np.float64]:
-        """The mass matrix.
+        """Evaluate the mass matrix.
 
         Parameters
         ----------
@@ -370,6 +376,16 @@ class FormulaModel(Model, written=True):
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the model with other values of some parameters.
 
+        Parameters
+        ----------
+        values : mapping of str to float
+            New values by name; the other parameters keep theirs.
+
+        Returns
+        -------
+        FormulaModel
+            The same equations with these values.
+
         Raises
         ------
         ModelError
@@ -392,6 +408,11 @@ class FormulaModel(Model, written=True):
             A signal for every input; several records where a fit has several.
         record : int
             The number of the record that :meth:`rates` and runs follow.
+
+        Returns
+        -------
+        FormulaModel
+            The same equations with these signals.
 
         Raises
         ------
@@ -489,6 +510,11 @@ class FormulaModel(Model, written=True):
             with a mass matrix also takes a force along a coordinate, ``"force(b)"``, or between two,
             ``"force(b - a)"``, which enters every acceleration.
 
+        Returns
+        -------
+        FormulaModel
+            The same equations with these terms.
+
         Raises
         ------
         ModelError
@@ -523,6 +549,16 @@ class FormulaModel(Model, written=True):
 
     def replace(self, **changes: Any) -> FormulaModel:
         """Return the model with other constructor arguments or parameters.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of :func:`udd.Model`, or parameters by name.
+
+        Returns
+        -------
+        FormulaModel
+            The changed model.
 
         Raises
         ------

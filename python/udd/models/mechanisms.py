@@ -56,6 +56,12 @@ def mechanism(
     ModelError
         Tables that do not fit together, or what :class:`udd.Model` refuses.
 
+    See Also
+    --------
+    udd.pendulum_chain : a chain of pendulums.
+    udd.Model : a model from the rates of its states.
+    udd.plot.time_series : draw a run.
+
     Examples
     --------
     A motor with a torque and friction:
@@ -157,7 +163,7 @@ def pendulum_chain(
     g: float = 9.81,
     motors: bool = False,
 ) -> FormulaModel:
-    """A chain of rigid pendulums in a plane, by Lagrange's equations: 1 to 3 links.
+    """Make a plane chain of 1 to 3 rigid pendulums by Lagrange's equations.
 
     Angles ``a1, a2, ...`` are counted from hanging down [rad], each link's own (not relative to the link
     above); speeds are ``w1, w2, ...``.
@@ -192,6 +198,12 @@ def pendulum_chain(
     ------
     ModelError
         Lists of different lengths, or of more than three links.
+
+    See Also
+    --------
+    udd.mechanism : any mechanism from its mass matrix.
+    udd.Pendulum : a single pendulum.
+    udd.plot.time_series : draw a run.
 
     Notes
     -----

@@ -58,6 +58,12 @@ class Pendulum(CompiledModel):
     ModelError
         A parameter that is not finite or has the wrong sign, an effect that moves the pivot.
 
+    See Also
+    --------
+    udd.moved_pendulum : a pendulum with a moving pivot.
+    udd.related_systems.pendulum : the damped pendulum in text form.
+    udd.plot.orbit : draw its motion.
+
     Examples
     --------
     >>> import udd

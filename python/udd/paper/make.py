@@ -33,6 +33,10 @@ class Drawn(OneLine):
         Width of the picture [inch], so that all are shown at one scale with text of one size.
     seconds : float
         Time to draw it, without films that existed already.
+
+    See Also
+    --------
+    udd.paper.Figure : the figure that it shows.
     """
 
     figure: Figure
@@ -51,6 +55,10 @@ class Checked(OneLine):
     verdict : Verdict
     seconds : float
         Time to check it.
+
+    See Also
+    --------
+    udd.paper.Verdict : what the check gave.
     """
 
     claim: Claim
@@ -70,6 +78,10 @@ class Reproduction:
     claims : tuple of Checked
     left_out : tuple of Figure or Claim
         Entries that need films, if films were excluded.
+
+    See Also
+    --------
+    udd.paper.reproduce : makes it.
     """
 
     page: Path
@@ -117,6 +129,11 @@ def reproduce(
     ------
     UddError
         A key is unknown, a key needs films but ``films=False``, or the folder cannot be written to.
+
+    See Also
+    --------
+    udd.paper.Reproduction : the result.
+    udd.plot.draw : draw any result.
 
     Examples
     --------

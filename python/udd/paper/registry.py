@@ -36,6 +36,10 @@ class Figure:
         Makes the picture.
     vector : bool
         True if it is stored as vector graphics (SVG), for simple drawings.
+
+    See Also
+    --------
+    udd.paper.Drawn : the picture of a figure.
     """
 
     key: str
@@ -58,6 +62,10 @@ class Verdict:
         The numbers.
     remark : str
         A qualification, if any.
+
+    See Also
+    --------
+    udd.paper.Claim : the claim that was checked.
     """
 
     verdict: str
@@ -81,6 +89,10 @@ class Claim:
         True if it needs films to be made and tracked.
     check : callable
         Computes it.
+
+    See Also
+    --------
+    udd.paper.Verdict : result of its check.
     """
 
     key: str

@@ -42,6 +42,11 @@ def bifurcation(
     UddError
         The result is no bifurcation diagram, or has no such component.
 
+    See Also
+    --------
+    udd.bifurcation : computes the points.
+    udd.plot.diagram : the same with branches.
+
     Examples
     --------
     >>> import udd
@@ -105,6 +110,11 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result holds no basins over two components.
+
+    See Also
+    --------
+    udd.basins : computes them.
+    udd.plot.bifurcation : attractors over a parameter.
 
     Examples
     --------

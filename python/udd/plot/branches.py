@@ -46,7 +46,7 @@ def branches(
     view: str = "section",
     section: str | None = None,
 ) -> Axes:
-    """Branches over the parameter: stable ones solid, unstable ones dashed, bifurcation points marked.
+    """Draw branches over the parameter: stable ones solid, unstable ones dashed, with bifurcations.
 
     Parameters
     ----------
@@ -68,6 +68,11 @@ def branches(
     ------
     UddError
         No branches, a component or view that there is not, or the periods of equilibria alone.
+
+    See Also
+    --------
+    udd.continuation : computes a branch.
+    udd.plot.diagram : the same with section points.
 
     Examples
     --------
@@ -110,7 +115,7 @@ def branches(
 
 @checked_arguments(error=UddError)
 def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = None) -> Axes:
-    """The one diagram: what motions do up and down, hysteresis shaded, branches and their points over it.
+    """Draw a bifurcation diagram: section points up and down, hysteresis, branches and bifurcations.
 
     Parameters
     ----------
@@ -128,6 +133,12 @@ def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = 
     ------
     UddError
         The result is no diagram, or has no such component.
+
+    See Also
+    --------
+    udd.diagram : computes it.
+    udd.plot.branches : the branches alone.
+    udd.plot.bifurcation : the section points alone.
 
     Examples
     --------

@@ -51,7 +51,7 @@ BY_KIND: dict[str, Callable[..., Axes]] = {
 
 
 def draw(result: Any, ax: Axes | None = None, **options: Any) -> Axes:
-    """Draw any result with the function that is made for its kind, as the result's own ``plot`` does.
+    """Draw any result with the function for its kind, like the `plot` of the result.
 
     Parameters
     ----------
@@ -69,6 +69,10 @@ def draw(result: Any, ax: Axes | None = None, **options: Any) -> Axes:
     ------
     UddError
         No picture is made for such a result.
+
+    See Also
+    --------
+    udd.plot : the functions by name.
 
     Examples
     --------

@@ -23,7 +23,7 @@ _SAME = 1e-9  # a component that varies by less of its size is the same everywhe
 
 @checked_arguments(error=UddError)
 def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, str] | None = None) -> Axes:
-    """The points of a section in the plane of two components; several surfaces in several colours.
+    """Draw the points of a section in the plane of two components, with a colour for each surface.
 
     Parameters
     ----------
@@ -41,6 +41,11 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
     ------
     UddError
         The result is no section, has no points, or no such component.
+
+    See Also
+    --------
+    udd.poincare : computes the section.
+    udd.plot.return_map : draw each point over the one before.
 
     Examples
     --------
@@ -66,7 +71,7 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
 
 @checked_arguments(error=UddError)
 def return_map(result: Section, ax: Axes | None = None, *, component: str | None = None) -> Axes:
-    """Each crossing's component over that of the crossing before, with the diagonal.
+    """Draw each crossing's component over that of the crossing before, with the diagonal.
 
     Parameters
     ----------
@@ -84,6 +89,11 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
     ------
     UddError
         The result is no section of one surface, has no points, or no such component.
+
+    See Also
+    --------
+    udd.Section.return_map : computes the pairs.
+    udd.plot.poincare : draw the points.
 
     Examples
     --------

@@ -53,6 +53,12 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.discover : estimates the curve.
+    udd.effects.curve : an effect from a curve.
+    udd.plot.residuals : draw the residuals.
     """
     require(curve, "a curve of a scan can be drawn", "coefficients", "slot")
     ax = new_axes(ax)

@@ -23,7 +23,7 @@ _LINE = 34  # letters of a candidate's title in one line
 
 @checked_arguments(error=UddError)
 def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: int = 12) -> Axes:
-    """The decrease in chi2 that each candidate would bring, with what it takes to be believed.
+    """Draw the decrease in chi2 that each candidate would bring, with the threshold of significance.
 
     The effect that was added has the decrease that came about; the others have a first estimate.
 
@@ -39,6 +39,11 @@ def evidence(discovery: Any, ax: Axes | None = None, *, stage: int = 0, most: in
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.discover : computes the scores.
+    udd.plot.errors : draw the errors on held-out data.
     """
     require(discovery, "a discovery holds evidence", "scans")
     if not 0 <= stage < len(discovery.scans):
@@ -116,7 +121,7 @@ def threshold(discovery: Any, stage: int) -> float:
 
 @checked_arguments(error=UddError)
 def errors(discovery: Any, ax: Axes | None = None) -> Axes:
-    """How far the model runs away from data it has not seen: before, after, and what no model could beat.
+    """Draw the error of free runs on held-out data: before, after, and the noise floor.
 
     Parameters
     ----------
@@ -126,6 +131,11 @@ def errors(discovery: Any, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.discover : computes the errors.
+    udd.plot.evidence : draw the scores of the candidates.
     """
     require(discovery, "a discovery holds errors", "error_before")
     from matplotlib.ticker import LogLocator

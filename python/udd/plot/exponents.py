@@ -47,6 +47,12 @@ def exponents(
     UddError
         The lengths differ, or `result` holds no exponents over one parameter.
 
+    See Also
+    --------
+    udd.lyapunov : computes exponents.
+    udd.lyapunov_spectrum : computes all exponents of an orbit.
+    udd.plot.spectrum : draw a single spectrum.
+
     Examples
     --------
     >>> import numpy as np, udd
@@ -139,6 +145,12 @@ def spectrum(result: Any, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result is neither.
+
+    See Also
+    --------
+    udd.lyapunov_spectrum : computes it.
+    udd.covariant_vectors : computes exponents along an orbit.
+    udd.plot.exponents : draw over a parameter.
 
     Examples
     --------

@@ -66,6 +66,12 @@ def residuals(
     ------
     UddError
         No such equation or coordinate, or not a fit.
+
+    See Also
+    --------
+    udd.fit : makes the fit.
+    udd.plot.residual_map : all equations and coordinates.
+    udd.plot.misfit : draw over time.
     """
     require_fit(fit)
     require_colour(colour)
@@ -115,6 +121,12 @@ def misfit(fit: Any, ax: Axes | None = None, *, channel: str | None = None) -> A
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.fit : makes the fit.
+    udd.plot.residuals : draw the residuals of the equations.
+    udd.plot.whiteness : draw the autocorrelation.
 
     Notes
     -----

@@ -21,7 +21,7 @@ _MEMBERS = 12  # drawn one by one
 
 @checked_arguments(error=UddError)
 def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = None) -> Axes:
-    """The median and the band of a forecast, a few of its members, and the measurement where there is one.
+    """Draw the median and the band of a forecast, some of its members, and the measurement.
 
     Parameters
     ----------
@@ -38,6 +38,11 @@ def forecast(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
     ------
     UddError
         No such channel, or not a forecast.
+
+    See Also
+    --------
+    udd.forecast : computes it.
+    udd.plot.time_series : draw the record.
     """
     require(result, "a forecast has a fan", "members", "valid_time")
     names = result.names

@@ -21,7 +21,7 @@ _LINE = "#00e5ff"  # stands out on grey, black and white alike
 
 @checked_arguments(error=UddError)
 def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes:
-    """A frame of the film with the disk's outline, its marks, its centre and the contact drawn over it.
+    """Draw a frame of the film with the fitted disk: outline, marks, centre and contact.
 
     Parameters
     ----------
@@ -35,6 +35,11 @@ def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.track : measures the film.
+    udd.tracking.overlay : the whole film.
     """
     from matplotlib.patches import Circle
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @checked_arguments(error=UddError)
 def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = None) -> Axes:
-    """The friction coefficient k(Omega) of a model, with a band of one standard error where it was fitted.
+    """Draw the friction coefficient k(Omega) of a model; of a fit with a band of one standard error.
 
     It is read off the model's own rates at the contact, where gravity and the drive exert no torque, so that
     every drag that was added is in it: k = -I (dOmega/dT)/Omega.
@@ -37,6 +37,11 @@ def friction(result: Any, ax: Axes | None = None, *, fastest: float | None = Non
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.fit : estimates the friction.
+    udd.plot.residuals : draw the residuals.
     """
     fit = result if is_fit(result) else None
     model = fit.model if fit is not None else result

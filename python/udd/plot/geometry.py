@@ -33,7 +33,7 @@ _TURNS = tuple(np.pi / 8 * k for k in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, 
 def geometry(
     ax: Axes | None = None, *, state: ArrayLike | None = None, R: float = 0.08, view: str = "front"
 ) -> Axes:
-    """The device with its coordinates: contact O, centre C, mark M, the signs of Y, Z, theta, phi, beta.
+    """Draw the device with its coordinates: contact O, centre C, mark M, and the signs of the angles.
 
     Parameters
     ----------
@@ -54,6 +54,11 @@ def geometry(
     ------
     UddError
         A view that there is not, a state without four numbers, a radius that is not positive.
+
+    See Also
+    --------
+    udd.Disk : the model.
+    udd.plot.orbit : draw the path of the centre.
 
     Notes
     -----

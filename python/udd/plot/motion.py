@@ -34,7 +34,7 @@ _COLOURS = (AFTER, BEFORE, "#009e73", "#cc79a7")
 
 @checked_arguments(error=UddError)
 def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[str] | None = None) -> Axes:
-    """Coordinates against time; of a fit the measured ones as dots and the fitted ones as lines.
+    """Draw coordinates over time; of a fit the measured ones as dots and the fitted ones as lines.
 
     Parameters
     ----------
@@ -52,6 +52,12 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
     ------
     UddError
         A coordinate that the result does not have, or coordinates with different units.
+
+    See Also
+    --------
+    udd.simulate : makes a run.
+    udd.fit : makes a fit.
+    udd.plot.orbit : draw the path.
 
     Examples
     --------
@@ -92,7 +98,7 @@ def time_series(result: Any, ax: Axes | None = None, *, coordinates: Sequence[st
 
 @checked_arguments(error=UddError)
 def orbit(result: Any, ax: Axes | None = None) -> Axes:
-    """The path of the disk's centre in the picture's plane, with the contact and the reach of the wheels.
+    """Draw the path of the disk's centre in the picture's plane, with the contact and the wheels' reach.
 
     A pendulum's path is drawn in its phase plane, the DLE's as (y, z), that of another model as its first two
     states.
@@ -106,6 +112,12 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
+
+    See Also
+    --------
+    udd.simulate : makes a run.
+    udd.plot.phase_space : draw in three dimensions.
+    udd.plot.time_series : draw over time.
     """
     drawn = motions(result)
     first = drawn[0]
@@ -155,7 +167,7 @@ def _device(ax: Axes, drawn: Sequence[Motion]) -> None:
 
 @checked_arguments(error=UddError)
 def phase_space(result: Any, ax: Axes | None = None) -> Axes:
-    """The orbit in three dimensions: J, Y, Z of the disk with J = I Omega - W Y; omega, y, z of the DLE.
+    """Draw the orbit in three dimensions: J, Y, Z of the disk, or omega, y, z of the DLE.
 
     Parameters
     ----------
@@ -171,6 +183,11 @@ def phase_space(result: Any, ax: Axes | None = None) -> Axes:
     UddError
         Of a pendulum, whose phase space is a plane (see :func:`orbit`), of a measurement, which holds no
         angular velocity, or of Axes without a third dimension.
+
+    See Also
+    --------
+    udd.simulate : makes a run.
+    udd.plot.orbit : draw in the plane.
     """
     from matplotlib.ticker import MaxNLocator
 

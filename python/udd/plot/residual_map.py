@@ -26,7 +26,7 @@ _SHORT = {"t": "time T", "R": "R", "beta": "β mod 2π", "Omega": "Ω", "theta":
 
 @checked_arguments(error=UddError)
 def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axes:
-    """The mean residual of every equation (rows) along every coordinate (columns), with bands of two errors.
+    """Draw the mean residual of every equation (rows) along every coordinate (columns).
 
     Where a model is right every band holds the zero line. A cell is framed where one does not: where the
     chance of the means' scatter is below 0.1 % over all cells together.
@@ -46,6 +46,11 @@ def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axe
     ------
     UddError
         Not a fit.
+
+    See Also
+    --------
+    udd.fit : makes the fit.
+    udd.plot.residuals : a single panel.
     """
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.patches import Rectangle

@@ -34,6 +34,12 @@ def cycle(result: Any, ax: Axes | None = None, *, components: tuple[str, str] | 
     UddError
         The result holds no orbit, or has no such component.
 
+    See Also
+    --------
+    udd.periodic_orbit : computes a cycle.
+    udd.connections : computes connecting orbits.
+    udd.plot.eigenvalues : draw its multipliers.
+
     Examples
     --------
     >>> import udd
@@ -85,6 +91,12 @@ def eigenvalues(result: Any, ax: Axes | None = None) -> Axes:
     UddError
         The result is neither.
 
+    See Also
+    --------
+    udd.equilibria : computes equilibria.
+    udd.periodic_orbit : computes a cycle.
+    udd.plot.cycle : draw the orbit.
+
     Examples
     --------
     >>> import udd
@@ -134,6 +146,11 @@ def locus(result: Any, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result is no locus.
+
+    See Also
+    --------
+    udd.locus : computes it.
+    udd.plot.branches : draw over a single parameter.
     """
     if not hasattr(result, "parameters") or not hasattr(result, "solutions"):
         raise UddError(f"a locus is of udd.locus, not {type(result).__name__}")
@@ -165,6 +182,11 @@ def cascade(result: Any, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result is no cascade.
+
+    See Also
+    --------
+    udd.cascade : computes it.
+    udd.plot.branches : draw the branches.
     """
     if not hasattr(result, "ratios") or not hasattr(result, "points"):
         raise UddError(f"a cascade is of udd.cascade, not {type(result).__name__}")
@@ -201,6 +223,10 @@ def lifetimes(result: Any, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result is none.
+
+    See Also
+    --------
+    udd.lifetimes : computes them.
     """
     if not hasattr(result, "settled") or not hasattr(result, "mean"):
         raise UddError(f"lifetimes are of udd.lifetimes, not {type(result).__name__}")
@@ -243,6 +269,11 @@ def ensemble(result: Any, ax: Axes | None = None, *, coordinate: str | None = No
     ------
     UddError
         The result is no ensemble, or has no such component.
+
+    See Also
+    --------
+    udd.ensemble : computes the runs.
+    udd.plot.time_series : draw a single run.
 
     Examples
     --------
@@ -290,6 +321,11 @@ def input_signal(result: Any, ax: Axes | None = None) -> Axes:
     UddError
         The result is no signal.
 
+    See Also
+    --------
+    udd.InputSignal : the signal.
+    udd.plot.bias : the effect of its noise.
+
     Examples
     --------
     >>> import udd
@@ -326,6 +362,11 @@ def bias(result: Any, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result is none.
+
+    See Also
+    --------
+    udd.input_bias : computes it.
+    udd.plot.input_signal : draw the inputs.
     """
     if not hasattr(result, "corrected"):
         raise UddError(f"a bias is of udd.input_bias, not {type(result).__name__}")
@@ -360,6 +401,11 @@ def energy(result: Any, ax: Axes | None = None) -> Axes:
     ------
     UddError
         The result is no balance.
+
+    See Also
+    --------
+    udd.energy_balance : computes it.
+    udd.plot.time_series : draw the motion.
     """
     if not hasattr(result, "stored") or not hasattr(result, "work"):
         raise UddError(f"a balance is of udd.energy_balance, not {type(result).__name__}")

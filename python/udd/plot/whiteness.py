@@ -27,7 +27,7 @@ def whiteness(
     colour: str = AFTER,
     name: str = "innovations",
 ) -> Axes:
-    """The autocorrelation of a fit's innovations, with the band that white noise keeps to.
+    """Draw the autocorrelation of a fit's innovations, with the 95 % band of white noise.
 
     Parameters
     ----------
@@ -47,6 +47,11 @@ def whiteness(
     ------
     UddError
         No such channel, or no innovations.
+
+    See Also
+    --------
+    udd.fit : makes the fit.
+    udd.plot.misfit : draw the misfits over time.
     """
     require(innovations, "innovations (udd.discovery) have an autocorrelation", "autocorrelation")
     require_colour(colour)

@@ -58,7 +58,7 @@ class EnergyBalance(Drawable, OneLine):
 
 @checked_arguments
 def energy_balance(run: Trajectory) -> EnergyBalance:
-    """Motor power against friction power along a run.
+    """Compute the work of motor and friction, and the stored energy, along a run.
 
     Parameters
     ----------
@@ -68,11 +68,17 @@ def energy_balance(run: Trajectory) -> EnergyBalance:
     Returns
     -------
     EnergyBalance
+        Fields ``t``, ``stored``, ``motor``, ``friction`` and ``effects``, each of shape (n,).
 
     Raises
     ------
     ModelError
         The model is a user's own, of which no energy is known.
+
+    See Also
+    --------
+    udd.simulate : makes the run.
+    udd.plot.energy : draw the balance.
 
     Notes
     -----
@@ -80,6 +86,10 @@ def energy_balance(run: Trajectory) -> EnergyBalance:
     plus what the effects put in; so on every bounded orbit the time averages of motor and friction power are
     the same without effects. Likewise ``omega^2/2 + z`` of the DLE changes by ``w - omega^2``. All powers are
     read off the model's own rates.
+
+    References
+    ----------
+    L. Maas [1].
 
     Examples
     --------

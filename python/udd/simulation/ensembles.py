@@ -34,7 +34,7 @@ __all__ = ["Ensemble", "ensemble"]
 
 @dataclass(frozen=True, eq=False)
 class Ensemble(Drawable):
-    """Many runs of one model at common times.
+    """Runs of one model at common times.
 
     Attributes
     ----------
@@ -51,6 +51,11 @@ class Ensemble(Drawable):
         The time of that.
     model : Model
         What was run, before parameters were varied.
+
+    See Also
+    --------
+    udd.ensemble : makes it.
+    udd.plot.ensemble : draw the runs.
     """
 
     t: NDArray[np.float64]
@@ -61,7 +66,7 @@ class Ensemble(Drawable):
     model: Model
 
     def to_xarray(self) -> xr.Dataset:
-        """The runs as labelled arrays: every state over the runs' axes and ``t``, with its unit.
+        """Return labelled arrays: every state over the runs' axes and ``t``, with its unit.
 
         Returns
         -------
@@ -149,6 +154,12 @@ def ensemble(
     ToleranceWarning
         A component falls below `atol` and grows again, and an error of `atol` changes what follows; some of
         the runs are checked.
+
+    See Also
+    --------
+    udd.simulate : one run, with events.
+    udd.sweep : grids too large for memory.
+    udd.plot.ensemble : draw the runs.
 
     Examples
     --------

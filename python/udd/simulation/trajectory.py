@@ -107,7 +107,7 @@ class Stats(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(Drawable):
-    """A run.
+    """Run of a model: times, states and events.
 
     Attributes
     ----------
@@ -127,6 +127,12 @@ class Trajectory(Drawable):
     dense : callable or None
         The core's record of all steps where ``simulate(..., dense=True)`` was asked for; call the
         trajectory instead.
+
+    See Also
+    --------
+    udd.simulate : makes it.
+    udd.plot.time_series : draw its coordinates.
+    udd.energy_balance : compute its work and energy.
     """
 
     t: NDArray[np.float64]
@@ -138,7 +144,7 @@ class Trajectory(Drawable):
     dense: _core.Dense | None = None
 
     def to_xarray(self) -> xr.Dataset:
-        """The run as labelled arrays: every state over ``t``, with its unit.
+        """Return the run as labelled arrays: every state over ``t``, with its unit.
 
         Returns
         -------
@@ -318,7 +324,8 @@ def simulate(
     Returns
     -------
     Trajectory
-        A run that leaves the disk is cut at the edge and has the outcome "ejected".
+        Fields ``t``, ``state``, ``outcome``, ``events``, ``stats``; each component by name. A run that leaves
+        the disk is cut at the edge and has the outcome "ejected".
 
     Raises
     ------
@@ -339,6 +346,18 @@ def simulate(
     ToleranceWarning
         A component falls below `atol` and grows again in proportion to itself, as a population does: an error
         of `atol` there changes what follows.
+
+    See Also
+    --------
+    udd.ensemble : many runs at once.
+    udd.poincare : crossings of a surface.
+    udd.plot.time_series : draw the coordinates over time.
+    udd.plot.orbit : draw the path.
+
+    References
+    ----------
+    Orders 5 and 8: J. R. Dormand and P. J. Prince [8], E. Hairer et al. [10]. Taylor series: À. Jorba and M.
+    Zou [13]. Rodas5P: G. Steinebach [12]. Sliding on a surface: A. F. Filippov [16].
 
     Examples
     --------

@@ -73,6 +73,12 @@ def sweep(
         Where a chunk's workers died again and again: what is finished is returned. After Ctrl-C, where a
         partial result was asked for.
 
+    See Also
+    --------
+    udd.SweepSpec : the quantities and their options.
+    udd.lyapunov : exponents of an array of drives.
+    udd.plot.exponents : draw exponents over a parameter.
+
     Notes
     -----
     The values do not depend on the executor, the store, the chunks or the number of threads, to the last

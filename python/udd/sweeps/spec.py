@@ -35,7 +35,7 @@ _KEYS = ("quantity", "model", "over", "state0", "options", "chunk")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepSpec:
-    """A quantity, a model and the values to compute it at: all that decides a sweep's numbers.
+    """Specification of a sweep: a quantity, a model, and the values to compute it at.
 
     Specs are equal where their hashes are.
 
@@ -61,6 +61,10 @@ class SweepSpec:
     ------
     ModelError
         An unknown name, or a value that cannot be used.
+
+    See Also
+    --------
+    udd.sweep : computes it.
 
     Examples
     --------
@@ -104,7 +108,13 @@ class SweepSpec:
         return tuple(len(values) for values in self.axes.values())
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it as plain data; equally spaced values as their ends and number."""
+        """Return the specification as plain data; equally spaced values as their ends and number.
+
+        Returns
+        -------
+        dict
+            As :meth:`from_dict` takes it.
+        """
         return {
             "quantity": self.quantity,
             "model": model_to_dict(self.model),
@@ -115,13 +125,29 @@ class SweepSpec:
         }
 
     def to_json(self) -> str:
-        """All of it as JSON, always in the same words."""
+        """Return the specification as JSON; equal specifications give equal texts.
+
+        Returns
+        -------
+        str
+            As :meth:`from_json` takes it.
+        """
         return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @classmethod
     @checked_arguments
     def from_dict(cls, data: Mapping[str, Any]) -> SweepSpec:
-        """The spec in plain data; `over` may also be a table of names and values.
+        """Make the specification from plain data.
+
+        Parameters
+        ----------
+        data : mapping
+            As :meth:`to_dict` returns it; `over` may also be a table of names and values.
+
+        Returns
+        -------
+        SweepSpec
+            Checked.
 
         Raises
         ------
@@ -142,7 +168,17 @@ class SweepSpec:
     @classmethod
     @checked_arguments
     def from_json(cls, text: str) -> SweepSpec:
-        """The spec in JSON.
+        """Make the specification from JSON.
+
+        Parameters
+        ----------
+        text : str
+            As :meth:`to_json` returns it.
+
+        Returns
+        -------
+        SweepSpec
+            Checked.
 
         Raises
         ------
@@ -154,13 +190,19 @@ class SweepSpec:
     @classmethod
     @checked_arguments
     def read(cls, path: str | os.PathLike[str], *, limit: float = LARGEST) -> SweepSpec:
-        """Read the spec in a file: TOML if its name ends so, otherwise JSON.
+        """Read the specification from a file: TOML if its name ends so, otherwise JSON.
 
         Parameters
         ----------
         path : path
+            The file.
         limit : float, default 1e9
             Bytes of memory that it may take: a hundred, and a thousand in TOML, for each byte of the file.
+
+        Returns
+        -------
+        SweepSpec
+            Checked.
 
         Raises
         ------

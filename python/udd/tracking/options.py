@@ -57,12 +57,17 @@ class MoreOptions(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class TrackOptions:
-    """Options of a film, read and free of contradictions; `udd.track` says what each is.
+    """Checked options of a film; :func:`udd.track` explains each of them.
 
     Attributes
     ----------
     tags : tuple of Tag
         The layout's printed tags, empty for coloured marks.
+
+    See Also
+    --------
+    udd.track : takes them.
+    udd.tracking.write_config : writes them to a file.
     """
 
     disk_radius: float = field(default=0.08, metadata=_entry("a positive number of metres", "m"))
@@ -129,7 +134,18 @@ class TrackOptions:
         self._check()
 
     def changed(self, changes: Mapping[str, Any]) -> TrackOptions:
-        """The same with other values of some options."""
+        """Return the options with other values of some of them.
+
+        Parameters
+        ----------
+        changes : mapping of str to value
+            Options by name.
+
+        Returns
+        -------
+        TrackOptions
+            Checked.
+        """
         said = {name: getattr(self, name) for name in FIELDS}
         if self.tags or self.bob is not None:  # from which the layout was made
             del said["layout"]
@@ -169,7 +185,18 @@ class TrackOptions:
             raise TrackError("sigma says how well layout is known, but layout is not given")
 
     def view(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Pixels inside the region, (height, width)."""
+        """Return the pixels inside the region.
+
+        Parameters
+        ----------
+        shape : (int, int)
+            Height and width of the picture [pixels].
+
+        Returns
+        -------
+        ndarray of bool, shape (height, width)
+            True inside the region.
+        """
         inside = np.zeros(shape, dtype=bool)
         u0, v0, u1, v1 = self.region or (0, 0, shape[1], shape[0])
         inside[max(0, math.floor(v0)) : math.ceil(v1), max(0, math.floor(u0)) : math.ceil(u1)] = True
@@ -180,7 +207,18 @@ class TrackOptions:
         return inside
 
     def inside(self, picture: Picture) -> Picture:
-        """The picture without colours outside the region."""
+        """Return the picture without colours outside the region.
+
+        Parameters
+        ----------
+        picture : Picture
+            A frame of the film.
+
+        Returns
+        -------
+        Picture
+            With grey outside the region.
+        """
         if self.region is None:
             return picture
         here = self.view(picture.y.shape)[::2, ::2][: picture.u.shape[0], : picture.u.shape[1]]

@@ -37,6 +37,11 @@ def overlay(video: str | os.PathLike[str], measurement: Measurement, path: str |
     UddError
         The place cannot be written to, or the measurement does not come from a film.
 
+    See Also
+    --------
+    udd.track : makes the measurement.
+    udd.plot.overlay : draw a single frame.
+
     Examples
     --------
     >>> import udd

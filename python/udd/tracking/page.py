@@ -36,6 +36,12 @@ def page(
     UddError
         The page cannot be written there, or the measurement does not come from a film.
 
+    See Also
+    --------
+    udd.track : makes the measurement.
+    udd.tracking.overlay : the film with the fitted disk.
+    udd.plot.overlay : draw a single frame.
+
     Examples
     --------
     >>> import udd

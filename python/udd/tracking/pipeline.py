@@ -61,7 +61,25 @@ UNSURE = 0.005  # of the disk's radius: a position known no better is not given
 
 @dataclass(frozen=True)
 class Tracking:
-    """A measurement with the tracks, the calibration and the camera from which it was made."""
+    """Result of the tracker: the measurement, the tracks, the calibration and the camera.
+
+    Attributes
+    ----------
+    measurement : Measurement
+        Poses in metres and radians.
+    tracks : Tracks
+        Marks and poses in pixels.
+    state : TrackerState
+        Calibration of the last pass.
+    camera : Camera
+        Map from metres to pixels.
+    outline : Rim or None
+        The rim of the disk, if it was seen.
+
+    See Also
+    --------
+    udd.tracking.track_disk : makes it.
+    """
 
     measurement: Measurement
     tracks: Tracks
@@ -150,6 +168,13 @@ def track(
         The file is missing, empty, not a film or too short. No marks are seen. An option has a wrong key or
         value.
 
+    See Also
+    --------
+    udd.tracking.click : makes a config by clicks.
+    udd.tracking.page : a page on the quality of the tracking.
+    udd.fit : fits a model to the measurement.
+    udd.plot.overlay : draw the fitted disk into a frame.
+
     Notes
     -----
     The contact point comes from the rolling constraint dY/dT = Z Omega, dZ/dT = -Y Omega + W, with a drive of
@@ -212,7 +237,38 @@ def track_disk(
     watch: Watch | None = None,
     **given: Any,
 ) -> Tracking:
-    """Track a disk, return also the poses in pixels; `watch` is called with each frame."""
+    """Track a disk, and return the poses in pixels with the measurement.
+
+    Parameters
+    ----------
+    video : path
+        The film.
+    progress : bool or callable, optional
+        As for :func:`udd.track`.
+    watch : callable, optional
+        Called with each :class:`TrackedFrame`.
+    **given
+        Other options of :func:`udd.track`.
+
+    Returns
+    -------
+    Tracking
+        Fields ``measurement``, ``tracks``, ``state``, ``camera`` and ``outline``.
+
+    Raises
+    ------
+    TrackError
+        The film cannot be read or tracked, or shows a pendulum.
+
+    See Also
+    --------
+    udd.track : returns the measurement alone.
+
+    Examples
+    --------
+    >>> from udd import tracking
+    >>> tracking.track_disk("run.mp4").measurement  # doctest: +SKIP
+    """
     result = run_tracker(video, progress=progress, watch=watch, **given)
     if not isinstance(result, Tracking):
         raise TrackError("a pendulum's film has no marks, so there is no detail; use udd.track")
@@ -456,10 +512,33 @@ def _refine(film: Film, state: TrackerState, tracks: Tracks, progress: Progress)
 def pictures_at(
     video: str | os.PathLike[str], frames: Sequence[int], tracked: Measurement | None = None
 ) -> list[NDArray[np.uint8]]:
-    """Return frames of a film by their number, as RGB arrays (height, width, 3).
+    """Return frames of a film by their number, as RGB arrays.
 
-    With `tracked`, what `udd.track` made of the film, they are corrected as they were for it: steadied,
-    turned upright.
+    With `tracked` they are corrected as the tracker corrected them: steadied and turned upright.
+
+    Parameters
+    ----------
+    video : path
+        The film.
+    frames : sequence of int
+        Numbers of the frames, counted from 0.
+    tracked : Measurement, optional
+        Result of :func:`udd.track` for this film.
+
+    Returns
+    -------
+    list of ndarray of uint8, shape (height, width, 3)
+        In the order of `frames`.
+
+    See Also
+    --------
+    udd.tracking.pictures_between : frames by their times.
+    udd.plot.overlay : draw the fitted disk into a frame.
+
+    Examples
+    --------
+    >>> from udd import tracking
+    >>> first, later = tracking.pictures_at("run.mp4", [0, 100])  # doctest: +SKIP
     """
     wanted = {int(i) for i in frames}
     images: dict[int, NDArray[np.uint8]] = {}
@@ -488,9 +567,32 @@ def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> F
 def pictures_between(
     video: str | os.PathLike[str], t: NDArray[np.float64], tracked: Measurement | None = None
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield the frames nearest to increasing times, as RGB arrays, corrected as for `tracked` if given.
+    """Yield the frames nearest to increasing times, as RGB arrays.
 
     Frames long before them are not decoded.
+
+    Parameters
+    ----------
+    video : path
+        The film.
+    t : ndarray, shape (n,)
+        Increasing times [s].
+    tracked : Measurement, optional
+        Result of :func:`udd.track`; frames are corrected as the tracker corrected them.
+
+    Yields
+    ------
+    ndarray of uint8, shape (height, width, 3)
+        One frame for each time.
+
+    See Also
+    --------
+    udd.tracking.pictures_at : frames by their numbers.
+
+    Examples
+    --------
+    >>> from udd import tracking
+    >>> frames = tracking.pictures_between("run.mp4", np.array([0.5, 1.0]))  # doctest: +SKIP
     """
     film, wanted = _as_tracked(video, tracked), iter(t.tolist())
     want = next(wanted, None)

@@ -14,19 +14,24 @@ from udd.video.rgb_frames import rgb
 
 @dataclass(frozen=True)
 class TrackedFrame:
-    """A picture and where the disk was found in it.
+    """Picture with the pose of the disk in it.
 
     Attributes
     ----------
     picture : Picture
+        The frame of the film.
     pose : Pose
-        NaN where the disk was not held.
+        NaN if the disk was not tracked.
     look : DiskAppearance
-        Of the marks.
+        Appearance of the marks.
     frames : int
-        How many the film has.
+        Number of frames in the film.
     full_range : bool
-        Of the brightness codes.
+        True if the brightness codes go from 0 to 255.
+
+    See Also
+    --------
+    udd.tracking.track_disk : calls `watch` with it.
     """
 
     picture: Picture
@@ -37,7 +42,7 @@ class TrackedFrame:
 
     @property
     def held(self) -> bool:
-        """Whether the disk was found."""
+        """True if the disk was tracked."""
         return bool(np.isfinite(self.pose.angle))
 
     @property

@@ -104,7 +104,7 @@ def real_time(t: float, slower: Sequence[tuple[float, float]]) -> float:
 
 
 class Film:
-    """A film file that can be run through any number of times.
+    """Film file whose frames can be read any number of times.
 
     Brightness and colour stay apart, as films store them: positions come from the brightness, which
     has the full resolution, and names of marks from the colour, whose samples lie half a pixel off.
@@ -112,6 +112,10 @@ class Film:
     those of the rate then, see :attr:`clock`. Times that truly vary stay as they are.
     Decoders are large and films come from anywhere, so they run in another process, with limits on memory,
     pixels and silence. A film that breaks the decoder is an error here.
+
+    See Also
+    --------
+    udd.tracking.pictures_at : frames as RGB arrays.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, fps: Rates | None = None) -> None:
@@ -160,13 +164,23 @@ class Film:
 
     @property
     def clock_text(self) -> str:
-        """Where the times come from, if they are not the container's own; empty if they are."""
+        """Source of the times if they are not the container's own; otherwise empty."""
         return "; ".join(text for text in (self.clock.text if self.clock else "", self.clock_note) if text)
 
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
-        """All frames that decode, in order of presentation, with increasing times.
+        """Yield all frames that decode, in order of presentation, with increasing times.
 
-        Those from the last key frame up to `since` [s] on, where it is above 0; they are numbered from it.
+        Frames are numbered from the first one that is yielded.
+
+        Parameters
+        ----------
+        since : float
+            If above 0, begin with the last key frame up to this time [s].
+
+        Yields
+        ------
+        Picture
+            Brightness, colour differences and time of a frame.
         """
         self.broken = 0
         if self.forced is not None or self.slower:

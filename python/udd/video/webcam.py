@@ -52,7 +52,22 @@ class Source(Protocol):
 
 @dataclass(frozen=True, repr=False)
 class Recording:
-    """A film that was recorded, and what was lost."""
+    """Recorded film, with its time stamps.
+
+    Attributes
+    ----------
+    path : Path
+        The film file.
+    t : ndarray, shape (n,)
+        Time stamps of the frames from the first one [s].
+    clock : {"camera", "computer"}
+        Source of the time stamps.
+
+    See Also
+    --------
+    udd.record : makes it.
+    udd.track : measures the film.
+    """
 
     path: Path
     t: NDArray[np.float64]  # time stamps of the frames [s, from the first]
@@ -71,7 +86,7 @@ class Recording:
 
     @property
     def lost(self) -> int:
-        """How many frames are missing in the gaps."""
+        """Number of frames missing in the gaps."""
         return int(np.sum(np.round(np.diff(self.gaps)[:, 0] / self.interval) - 1))
 
     def __repr__(self) -> str:
@@ -132,6 +147,11 @@ def record(
     -----
     UserWarning
         The camera stopped before the time was over.
+
+    See Also
+    --------
+    udd.track : measures the film.
+    udd.tracking.click : sets up the tracker by clicks.
 
     Notes
     -----

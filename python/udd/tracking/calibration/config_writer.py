@@ -39,6 +39,11 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
     UddError
         There is no such folder, or the file cannot be written.
 
+    See Also
+    --------
+    udd.tracking.click : finds the options by clicks.
+    udd.track : takes the file.
+
     Examples
     --------
     >>> import tempfile, pathlib, udd.tracking

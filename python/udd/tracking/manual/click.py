@@ -23,7 +23,7 @@ SIZE = (10.4, 7.2)  # inches
 def click(
     video: str | os.PathLike[str], *, distance: float | None = None, config: Config | None = None
 ) -> dict[str, Any]:
-    """Ask in a window for clicks on a calm frame of a film, and return what they say of it.
+    """Ask for clicks on a calm frame of a film, and return the options that follow from them.
 
     Parameters
     ----------
@@ -47,6 +47,11 @@ def click(
     TrackError
         The person left; no window can be opened here; the film cannot be read; the distance is not a positive
         number, or the scale is known as well; the film is a pendulum's.
+
+    See Also
+    --------
+    udd.track : takes the options.
+    udd.tracking.write_config : writes them to a file.
 
     Notes
     -----

@@ -44,7 +44,32 @@ class Camera:
 
 @dataclass(frozen=True)
 class Pixels:
-    """Where to draw the fitted disk in the picture (pixels: u to the right, v down; NaN where not seen)."""
+    """Fitted disk in picture coordinates (pixels: u to the right, v down; NaN where not seen).
+
+    Attributes
+    ----------
+    centre : ndarray, shape (n, 2)
+        The centre of the disk.
+    angle : ndarray, shape (n,)
+        The orientation beta [rad].
+    marks : ndarray, shape (n, marks, 2)
+        The marks; those of the standard disk are red, orange, blue, green.
+    rim : ndarray, shape (n, 73, 2)
+        A closed line along the rim.
+    radius : float
+        Radius of the disk.
+    pivot : ndarray, shape (2,)
+        The contact.
+    scale : float
+        Pixels per metre.
+    colours : tuple of (int, int, int)
+        Colours of the marks, sRGB.
+
+    See Also
+    --------
+    udd.tracking.pixels : makes it.
+    udd.plot.overlay : draw it into a frame.
+    """
 
     centre: Array  # (n, 2)
     angle: Array  # (n,) beta [rad]
@@ -57,17 +82,33 @@ class Pixels:
 
 
 def pixels(m: Measurement) -> Pixels:
-    """The fitted disk in picture coordinates, from what a tracked measurement says about its camera.
+    """Compute the fitted disk in picture coordinates, from the camera of a tracked measurement.
 
     Parameters
     ----------
     m : Measurement
         From `udd.track`, or read back from its file.
 
+    Returns
+    -------
+    Pixels
+        Fields ``centre``, ``angle``, ``marks``, ``rim``, ``radius``, ``pivot``, ``scale``, ``colours``.
+
     Raises
     ------
     KeyError
         The measurement does not come from a film.
+
+    See Also
+    --------
+    udd.track : makes the measurement.
+    udd.plot.overlay : draw the disk into a frame.
+
+    Examples
+    --------
+    >>> from udd import tracking
+    >>> m = udd.track("run.mp4")  # doctest: +SKIP
+    >>> tracking.pixels(m).centre[0]  # doctest: +SKIP
     """
     if "length_px" in m.meta:
         return _of_pendulum(m)
