@@ -55,11 +55,28 @@ def test_a_map_is_drawn_again_in_other_colours(opened: Opened, tab: str, canvas:
     opened.said.clear()  # the browser remarks that the test reads pixels
 
 
-def test_a_phone_shows_the_disk_and_play_at_once_and_scrolls(browser: Any, link: str) -> None:
-    SIZES["phone"] = (390, 844)
+def test_the_axes_of_a_projector_are_labelled_without_overlap(opened: Opened) -> None:
+    page = opened.go("#model=disk&W=0.03&state=0,0.001,0.04,0&tab=series")
+    page.click("#projector")
+    page.wait_for_timeout(2000)  # the axes grow with the motion
+    boxes = page.evaluate("udd.phase.boxes")
+    assert len(boxes) >= 5  # three names, and numbers
+    for k, (left, top, right, bottom) in enumerate(boxes):
+        assert left >= 0 and right <= page.evaluate("udd.phase.width")
+        for other in boxes[:k]:
+            assert right < other[0] or left > other[2] or bottom <= other[1] or top >= other[3]
+    numbers = """async (range) => {
+      const { ticks } = await import("/static/plot.js");
+      return ticks(...range).map(([, text]) => text);
+    }"""
+    assert page.evaluate(numbers, [-8.5, 8.5, 2.6]) == ["−5", "0", "5"]
+    assert page.evaluate(numbers, [0, 22, 11]) == [str(k) for k in range(0, 23, 2)]
+
+
+def test_a_phone_shows_the_disk_play_and_the_drive_at_once_and_scrolls(browser: Any, link: str) -> None:
     one = Opened(browser, link, "phone")
     page = one.go()
-    for part in ("#disk", "#play"):
+    for part in ("#disk", "#play", "#drive input[type=range]"):
         box = page.locator(part).bounding_box()
         assert box["y"] >= 0 and box["y"] + box["height"] <= 844
     assert page.locator("#plane").is_visible()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-SIZES = {"laptop": (1280, 720), "tablet": (820, 1180)}
+SIZES = {"laptop": (1280, 720), "tablet": (820, 1180), "phone": (390, 844)}
 
 
 def until(page: Any, condition: str, seconds: float = 60.0) -> None:

@@ -67,13 +67,18 @@ export class PhaseView extends Canvas {
     }
   }
 
-  /** A label beyond the end of an axis, within the canvas; that of the upright axis stands above it. */
-  label(c, text, x, y, upright) {
-    const wide = c.measureText(text).width;
-    const left = upright ? x - wide / 2 : x < this.width / 2 ? x - wide : x;
-    c.textAlign = "left";
-    c.fillText(text, Math.max(2, Math.min(this.width - wide - 2, left)), upright ? y - this.text : y);
-    c.textAlign = "center";
+  /** The box of a text [left, top, right, bottom] about a point, within the canvas. */
+  box(c, text, x, y) {
+    const half = c.measureText(text).width / 2, high = this.text / 2;
+    const centre = Math.max(half + 2, Math.min(this.width - half - 2, x));
+    return [centre - half, y - high, centre + half, y + high];
+  }
+
+  /** Write a text unless it would touch one that is there; `boxes` lists these. */
+  write(c, text, box) {
+    if (this.boxes.some(([l, t, r, b]) => box[0] < r + 2 && box[2] > l - 2 && box[1] < b && box[3] > t)) return;
+    this.boxes.push(box);
+    c.fillText(text, (box[0] + box[2]) / 2, (box[1] + box[3]) / 2);
   }
 
   frame(c, project, labels) {
@@ -84,27 +89,34 @@ export class PhaseView extends Canvas {
     for (let k = 0; k < 8; k++) {
       for (const bit of [1, 2, 4]) if (!(k & bit)) line(c, ...corner(k), ...corner(k | bit));
     }
+    const font = (size) => `${size}px "Source Sans 3", "Helvetica Neue", Arial, sans-serif`;
+    const ends = [[x, 0, 0], [0, y, 0], [0, 0, z]];
+    this.boxes = [];
     c.strokeStyle = "#9a9a9a";
     c.fillStyle = INK;
-    c.font = `${this.text * 1.1}px "Source Sans 3", "Helvetica Neue", Arial, sans-serif`;
+    c.font = font(this.text * 1.1);
     c.textAlign = "center";
     c.textBaseline = "middle";
-    const ends = [[x, 0, 0], [0, y, 0], [0, 0, z]];
+    // The axes' names first: a number that would touch a name is left out.
     for (const [k, end] of ends.entries()) {
       line(c, ...project(...end.map((v) => -v)), ...project(...end));
-      const [name, unit, scale] = labels[k];
-      c.fillStyle = INK;
-      this.label(c, unit ? `${name} [${unit}]` : name, ...project(...end.map((v) => 1.15 * v)), k === 2);
-      c.fillStyle = SOFT;
-      const small = c.font;
-      c.font = small.replace(/^[\d.]+/, (size) => String(size * 0.8));
-      for (const [value, text] of ticks(-this.reach[k] * scale, this.reach[k] * scale, 3)) {
-        if (Math.abs(value) < 0.3 * this.reach[k] * scale) continue;
-        const [px, py] = project(...end.map((v) => (v ? value / scale : 0)));
+      const [name, unit] = labels[k];
+      const text = unit ? `${name} [${unit}]` : name;
+      const [px, py] = project(...end.map((v) => 1.15 * v));
+      const half = c.measureText(text).width / 2;
+      const aside = k === 2 ? 0 : px < this.width / 2 ? -half : half;
+      this.write(c, text, this.box(c, text, px + aside, k === 2 ? py - this.text : py));
+    }
+    c.fillStyle = SOFT;
+    c.font = font(this.text * 0.88);
+    for (const [k, end] of ends.entries()) {
+      const most = this.reach[k] * labels[k][2];
+      for (const [value, text] of ticks(-most, most, 3)) {
+        if (Math.abs(value) < 0.3 * most) continue;
+        const [px, py] = project(...end.map((v) => (v ? value / labels[k][2] : 0)));
         c.fillRect(px - 1.5, py - 1.5, 3, 3);
-        c.fillText(text, px, py + this.text * 0.85);
+        this.write(c, text, this.box(c, text, px, py + this.text * 0.85));
       }
-      c.font = small;
     }
   }
 }

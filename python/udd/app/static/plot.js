@@ -61,11 +61,14 @@ export class Canvas {
   }
 }
 
-/** Round numbers between two others. */
+/** Round numbers between two others: about so many, but at least two. */
 export function ticks(low, high, most) {
   const rough = (high - low) / Math.max(1, most);
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((x) => x * power).find((x) => x >= rough);
+  const count = (x) => Math.floor(high / x + 1e-9) - Math.ceil(low / x - 1e-9) + 1;
+  const steps = [0.2, 0.5, 1, 2, 5, 10].map((x) => x * power);
+  const wide = steps.findIndex((x) => x >= rough);
+  const step = steps[wide] && steps.slice(0, wide + 1).findLast((x) => count(x) >= 2);
   const made = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) made.push(k * step);
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
