@@ -11,6 +11,7 @@ import pytest
 
 import udd
 from udd.app import worker
+from udd.app.driven_models import TORQUE, driven_model
 from udd.app.table_columns import look, measurement_of
 from udd.errors import UddError
 
@@ -61,6 +62,50 @@ def test_a_choice_with_units_is_read(tmp_path: Path) -> None:
     ):
         with pytest.raises(UddError, match=words):
             measurement_of(path, choice, {})
+
+
+@pytest.mark.parametrize(
+    ("head", "guesses"),
+    [
+        ("Zeit;Auslenkung x;Drehmoment", ["t", "theta", "input"]),
+        ("tijd;positie (rad);koppel (Nm)", ["t", "theta", "input"]),
+        ("Time;Angle;Motor voltage", ["t", "theta", "input"]),
+        ("t;theta;torque", ["t", "theta", "input"]),
+        ("Zeit;Strom;Spannung", ["t", "", ""]),  # no motion
+    ],
+)
+def test_an_input_is_guessed(head: str, guesses: list[str], tmp_path: Path) -> None:
+    seen = look(table(tmp_path, head, T, np.radians(SWING), SWING))
+    assert [column["guess"] for column in seen["columns"]] == guesses
+
+
+def test_a_pendulum_with_a_measured_torque_is_fitted() -> None:
+    choice = [["t", "time (s)", "s"], ["theta", "position (rad)", "rad"], ["input", "torque (N m)", ""]]
+    m = measurement_of(udd.examples.path("driven.csv"), choice, {})
+    assert m.names == ("theta",) and tuple(m.inputs) == (TORQUE,)
+    fit = udd.fit(m, driven_model(m, 0.7, 0.08))
+    # The table was made with 12 sin(theta) and 4 times the torque.
+    assert fit.parameters["length"] / 0.7**2 * 9.81 == pytest.approx(12.0, rel=0.1)
+    assert fit.parameters["gain"] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_disk_with_a_measured_drive_is_read_and_fitted(tmp_path: Path) -> None:
+    t = np.arange(0.0, 8.0, 0.02)
+    drive = udd.InputSignal(t, 0.03 + 0.01 * np.sin(t))
+    model = udd.driven_disk(0.08, k0=0.012, k1=0.103, k2=0.055)
+    run = udd.simulate(model, t, [0.0, 0.001, 0.04, 0.0], inputs={"W": drive, "W_rate": drive.rate()})
+    motion = run.state[:, 1:] + np.random.default_rng(1).normal(0.0, 1e-4, (len(t), 3))
+    head = "Zeit;rechts;Höhe;Drehwinkel;Antrieb"
+    path = table(tmp_path, head, t, 100 * motion[:, 0], 100 * motion[:, 1], motion[:, 2], 1000 * drive.values)
+    lengths = [[role, name, unit] for role, name, unit in zip(
+        ("t", "Y", "Z", "beta"), head.split(";"), ("s", "cm", "cm", "rad"), strict=False
+    )]  # fmt: skip
+    with pytest.raises(UddError, match="unit of the input"):
+        measurement_of(path, [*lengths, ["input", "Antrieb", ""]], {})
+    m = measurement_of(path, [*lengths, ["input", "Antrieb", "mm/s"]], {})
+    np.testing.assert_allclose(m.inputs["W"].values, drive.values, atol=1e-7)
+    fit = udd.fit(m, driven_model(m, None, 0.08))
+    assert abs(fit.parameters["k0"] - 0.012) < 5 * fit.errors["k0"] < 0.005
 
 
 def test_a_phone_s_zip_goes_through(tmp_path: Path) -> None:

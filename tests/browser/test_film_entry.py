@@ -58,3 +58,32 @@ def test_a_phone_needs_a_length_alone(opened: Opened) -> None:
         "",
     ]
     assert why(opened).startswith("Say the length")
+
+
+def test_a_driven_pendulum_goes_from_its_table_to_the_verdict(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#to-film")
+    page.set_input_files("#file", udd.examples.path("driven.csv"))
+    until(page, "!document.getElementById('columns').hidden")
+    chosen = page.eval_on_selector_all("#column-table select", "all => all.map(s => s.value)")
+    assert chosen == ["t", "theta", "input", "s", "rad", ""]
+    assert why(opened).startswith("Say the length of the pendulum first")
+    page.fill("#loop-length", "70")
+    assert why(opened) == ""
+    page.click("#go")
+    page.wait_for_selector("#found:not([hidden])", timeout=300_000)
+    assert page.locator("#verdict").text_content() == "effect identified"
+    assert "|Ω|" in page.locator("#added").text_content() or "abs(Ω)" in page.locator("#added").text_content()
+    # A disk's input is the drive itself: its unit is asked for, and W is not.
+    page.click("#another")
+    disk = "a;b;c;d;e\n" + "".join(f"{k / 50:.2f};{k % 7};{k % 5};{k};{30 + k % 3}\n" for k in range(60))
+    page.set_input_files("#file", {"name": "d.csv", "mimeType": "text/csv", "buffer": disk.encode()})
+    until(
+        page,
+        "document.querySelector('#column-table th').textContent === 'a'",
+    )
+    for k, role in enumerate(["t", "Y", "Z", "beta", "input"]):
+        page.select_option(f"#column-table tr >> nth=1 >> select >> nth={k}", role)
+    assert why(opened).startswith("Choose the unit of the drive speed")
+    page.select_option("#column-table tr >> nth=2 >> select >> nth=4", "cm/s")
+    assert why(opened) == ""

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from browser_for_tests import SIZES, Opened, until
+from browser_for_tests import Opened, until
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 

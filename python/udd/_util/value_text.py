@@ -32,4 +32,5 @@ def with_error(value: float, error: float | None, power: str = "e{}") -> str:
     error = float(f"{error:.1e}")
     digits = max(1 - math.floor(math.log10(error)), 0)
     within = f"{error:.{digits}f}" if error >= 1.0 else f"{error * 10**digits:.0f}"
-    return f"{value:.{digits}f}({within}){ending}"
+    rounded = f"{round(value, digits) + 0.0:.{digits}f}"  # adding 0 makes -0 positive
+    return f"{rounded}({within}){ending}"

@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 
 from udd.errors import MeasurementError, UddError
-from udd.measurement import Measurement, read_measurement
+from udd.measurement import InputSignal, Measurement, read_measurement
 from udd.measurement.formats.headings import COUNTED, UNITS
 from udd.measurement.formats.table import Table
-from udd.measurement.guesses import ROLES, guessed
+from udd.measurement.guesses import ROLES, guessed, is_input
 from udd.measurement.gyroscope import holds_rates_alone, read_gyroscope
 from udd.measurement.read import tables_of
+
+from .driven_models import DRIVE, TORQUE
 
 _ROWS = 6  # that are shown
 _COLUMNS = 40
 _KNOWN = ("W", "R", "length")  # what a header may say
+_INPUT = "input"  # the role of what drives the machine
+_MOTIONS = ({"theta"}, {"Omega"}, {"Y", "Z", "beta"})
 
 
 def look(path: Path) -> dict[str, Any]:
@@ -27,6 +31,10 @@ def look(path: Path) -> dict[str, Any]:
     tables = tables_of(path)
     table = max(tables, key=len)
     roles = guessed(table)
+    if "t" in roles and {*roles} - {"", "t"} in _MOTIONS:
+        free = [k for k, role in enumerate(roles) if not role and is_input(table, k)]
+        for k in free[:1]:
+            roles[k] = _INPUT
     chosen = [k for k, heading in enumerate(table.headings) if heading.name not in ("", "_")][:_COLUMNS]
     return {
         "columns": [
@@ -41,7 +49,7 @@ def look(path: Path) -> dict[str, Any]:
         "rows": len(table),
         "meta": {name: _number(table.meta.get(name)) for name in _KNOWN},
         "kind": _kind(path),
-        "units": {role: list(UNITS[_base(role)]) for role in ROLES},
+        "units": {role: list(UNITS[_base(role)]) for role in ROLES} | {_INPUT: ["", *UNITS["m/s"]]},
     }
 
 
@@ -113,19 +121,33 @@ def measurement_of(path: Path, choices: Sequence[Any], constants: dict[str, Any]
         if not isinstance(choice, list) or [type(part) for part in choice] != [str] * 3:
             raise UddError("the choice of columns cannot be read")
         role, heading, unit = choice
-        if role not in ROLES:
+        if role not in (*ROLES, _INPUT):
             raise UddError(f"no column is a {role:.20}")
         if role in columns:
             raise UddError(f"two columns are chosen as {role}")
         columns[role], units[role] = heading, unit
-    made = set(columns) - {"t"}
-    if made not in ({"theta"}, {"Omega"}, {"Y", "Z", "beta"}):
-        raise UddError("choose t with theta, t with Omega, or t with Y, Z and beta")
-    measurement = read_measurement(path, columns, **constants)
+    driver = columns.pop(_INPUT, None)
+    if set(columns) - {"t"} not in _MOTIONS:
+        raise UddError(
+            "choose t with theta, t with Omega, or t with Y, Z and beta; an input may go with any of them"
+        )
+    name = TORQUE if {"theta", "Omega"} & set(columns) else DRIVE
+    if driver and name == DRIVE and not units[_INPUT]:
+        raise UddError("choose the unit of the input: with a disk it is the drive speed W")
+    record = read_measurement(path, columns, inputs=driver and {name: driver}, **constants)
     stated = {h.raw: h.unit for table in tables_of(path) for h in table.headings}
     factors = {role: _factor(role, units[role], stated.get(columns[role], "")) for role in columns}
-    values = measurement.values * [factors[name] for name in measurement.names]
-    return replace(measurement, t=measurement.t * factors.get("t", 1.0), values=values)
+    values = record.values * [factors[column] for column in record.names]
+    inputs = {}
+    if driver:
+        signal, times = record.inputs[name], factors.get("t", 1.0)
+        factor = (
+            UNITS["m/s"][units[_INPUT]] if name == DRIVE else 1.0
+        )  # an input keeps the unit of its column
+        inputs[name] = InputSignal(signal.t * times, signal.values * factor, signal.hold)
+        if name == DRIVE:
+            inputs["W_rate"] = inputs[name].rate()
+    return replace(record, t=record.t * factors.get("t", 1.0), values=values, inputs=inputs)
 
 
 def _factor(role: str, unit: str, stated: str) -> float:

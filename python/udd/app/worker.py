@@ -92,14 +92,19 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     else:
         measurement = measurement_of(file, asked.get("columns") or [], constants)
     measurement.to_csv(OUT / "measurement.csv")
-    if measurement.kind == "pendulum" or measurement.names == ("Omega",):
-        length = asked.get("length") or measurement.meta.get("length")
-        if not length:
-            raise UddError("this is a pendulum's record: say its length in cm")
+    swings = measurement.names in (("theta",), ("Omega",))
+    length, R = asked.get("length") or measurement.meta.get("length"), measurement.meta.get("R", 0.08)
+    if swings and not length:
+        raise UddError("this is a pendulum's record: say its length in cm")
+    if measurement.inputs:
+        from .driven_models import driven_model
+
+        model: Model = driven_model(measurement, float(length) if swings else None, float(R))
+    elif swings:
         pendulum = Pendulum(float(length))
-        model: Model = pendulum if measurement.kind == "pendulum" else pendulum.with_gyroscope()
+        model = pendulum if measurement.kind == "pendulum" else pendulum.with_gyroscope()
     else:
-        W, R = measurement.meta.get("W"), measurement.meta.get("R", 0.08)
+        W = measurement.meta.get("W")
         if W is None:
             raise UddError(_NO_DRIVE)
         model = Disk(float(W), R=float(R))

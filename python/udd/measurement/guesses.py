@@ -20,6 +20,20 @@ _WORDS: dict[str, tuple[str, ...]] = {
     "Z": ("height", "vertical", "hohe", "hoehe", "vertikal", "hoogte", "verticaal"),
     "Y": ("horizontal", "waagerecht", "horizontaal", "sideways"),
 }
+#: Words of headings of what drives a machine.
+_DRIVERS = (
+    "torque",
+    "voltage",
+    "current",
+    "force",
+    "input",
+    "drive",
+    "motor",
+    "drehmoment",
+    "spannung",
+    "strom",
+)
+_DRIVERS += ("kraft", "antrieb", "eingang", "koppel", "spanning", "stroom", "kracht", "aandrijving", "ingang")
 _LETTERS = {"t": "t", "y": "Y", "z": "Z"}
 
 
@@ -34,10 +48,31 @@ def guessed(table: Table) -> list[str]:
     for k, role in enumerate(roles):
         roles[k] = "" if role in taken else role
         taken.add(role)
+    if not taken & {*ROLES[1:]}:  # an angle by its unit alone
+        angles = [k for k, heading in enumerate(table.headings) if heading.unit in UNITS["rad"]]
+        for k in angles[:1]:
+            roles[k] = "theta"
     if "theta" in taken or not taken & {"Y", "Z", "beta"}:
         # A pendulum's table: what else has an axis' letter is passed over.
         roles = ["" if role in ("Y", "Z", "beta") else role for role in roles]
     return ["" if role == "Omega" and taken & {"theta", "Y", "Z"} else role for role in roles]
+
+
+def is_input(table: Table, k: int) -> bool:
+    """Return True if a column varies and its heading names what drives a machine, such as a torque."""
+    words = _words(table.headings[k])
+    if not any(word in words for word in _DRIVERS):
+        return False
+    try:
+        return float(np.ptp(table.numbers(k))) > 0.0
+    except ValueError:
+        return False
+
+
+def _words(heading: Heading) -> str:
+    """Return a heading in lower case and without accents."""
+    plain = unicodedata.normalize("NFKD", heading.raw.casefold())
+    return "".join(letter for letter in plain if not unicodedata.combining(letter))
 
 
 def _role(heading: Heading) -> str:
@@ -45,8 +80,7 @@ def _role(heading: Heading) -> str:
         return heading.name
     if heading.unit in UNITS["rad/s"]:
         return "Omega"
-    plain = unicodedata.normalize("NFKD", heading.raw.casefold())
-    words = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    words = _words(heading)
     for role, known in _WORDS.items():
         if any(word in words for word in known):
             return role

@@ -2,7 +2,7 @@
 import { t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
-const ROLES = ["", "t", "theta", "Omega", "Y", "Z", "beta"];
+const ROLES = ["", "t", "theta", "Omega", "Y", "Z", "beta", "input"];
 const KINDS = { "t theta": "pendulum", "Omega t": "gyroscope", "Y Z beta t": "disk" };
 
 export class Columns {
@@ -36,7 +36,7 @@ export class Columns {
       role.value = column.guess;
       const offer = () => {
         const known = found.units[role.value] ?? [];
-        unit.replaceChildren(...known.map((u) => new Option(u, u)));
+        unit.replaceChildren(...known.map((u) => new Option(u || t("unit_as_recorded"), u)));
         unit.value = known.includes(column.unit) ? column.unit : known[0] ?? "";
         unit.hidden = !known.length;
       };
@@ -61,13 +61,30 @@ export class Columns {
 
   /** Whether the table is understood as it stands. */
   get plain() {
-    return !this.touched && ["disk", "pendulum", "gyroscope"].includes(this.found.kind);
+    return !this.touched && !this.roles.includes("input") && ["disk", "pendulum", "gyroscope"].includes(this.found.kind);
+  }
+
+  /** The roles that are chosen. */
+  get roles() {
+    return this.selects.map(([role]) => role.value).filter(Boolean);
+  }
+
+  /** Whether a column is what drives the machine. */
+  get driven() {
+    return this.roles.includes("input");
   }
 
   /** What the choice makes: "disk", "pendulum", "gyroscope", or nothing. */
   get kind() {
     if (this.plain) return this.found.kind;
-    return KINDS[this.selects.map(([role]) => role.value).filter(Boolean).sort().join(" ")] ?? "";
+    const motion = [...this.roles].sort();
+    if (this.driven) motion.splice(motion.indexOf("input"), 1); // a second one makes no kind
+    return KINDS[motion.join(" ")] ?? "";
+  }
+
+  /** Whether the unit of a measured drive speed is missing. */
+  get unitMissing() {
+    return this.kind === "disk" && this.driven && this.selects.some(([role, unit]) => role.value === "input" && !unit.value);
   }
 
   /** The choice as the server reads it; nothing if the table is understood as it stands. */

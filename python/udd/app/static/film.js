@@ -115,7 +115,8 @@ export class Loop {
     if (!this.table) return "";
     const kind = this.columns.kind;
     if (!kind) return t("why_columns");
-    if (kind === "disk") return this.said("W") || this.table.meta.W !== null ? "" : t("why_W");
+    if (this.columns.unitMissing) return t("why_unit");
+    if (kind === "disk") return this.columns.driven || this.said("W") || this.table.meta.W !== null ? "" : t("why_W");
     return this.said("length") || this.table.meta.length !== null ? "" : t("why_length");
   }
 
