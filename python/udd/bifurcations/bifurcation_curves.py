@@ -21,7 +21,6 @@ from .branch import BifurcationPoint
 from .branch_continuation import bounds_of, in_unit_of, unit_of
 from .branch_ends import hopf_end, vanishing_part
 from .branch_following import CLOSED
-from .branch_solutions import solution_at
 from .connecting_orbits import Connection
 from .connection_curves import ConnectionWay
 from .conservative_families import FamilyCurve
@@ -278,7 +277,7 @@ def _note(surface: SolutionSurface, kind: str, point: SurfacePoint) -> _Note:
     u, frequency = point.v[:-1], float("nan")
     if FUNCTIONS[kind] == "complex_pair":
         frequency = point.curve.frequency(u, point.functions)
-    return _Note(surface.values(point), solution_at(point.curve, u), frequency)
+    return _Note(surface.values(point), point.curve.solution(u), frequency)
 
 
 def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> list[LocusPoint]:
@@ -316,7 +315,7 @@ class _Way:
         watched: dict[str, float] | None = None
         while len(trace.notes) <= self.most:
             try:
-                here = surface.fix_phase(here)
+                surface, here = surface.anchored(here)
                 slope = surface.slope(here, name)
                 before = watched_functions(self.kind, surface, here, slope) if watched is None else watched
             except (CorrectorFailed, IntegrationError) as error:

@@ -12,10 +12,17 @@ from scipy import optimize
 from .bifurcation_functions import STILL, TestFunctions
 from .branch import AnyCurve, BifurcationPoint
 from .equilibrium_curve import EquilibriumCurve
-from .error_bounds import COARSE, rounding_of
+from .error_bounds import COARSE, rounding_of, scatter
 from .flow_map import Floats
 from .orbit_geometry import as_liouville
-from .pseudo_arclength import CorrectorFailed, CurvePoint, nearest_of_family, newton_corrector, tangent_at
+from .pseudo_arclength import (
+    CorrectorFailed,
+    CurvePoint,
+    corrected_point,
+    nearest_of_family,
+    newton_corrector,
+    tangent_at,
+)
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
@@ -92,8 +99,7 @@ def turning(
     for _ in range(6):
         middle = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
         try:
-            u = newton_corrector(curve, a.u + middle * a.tangent, a.tangent)
-            place = CurvePoint(u, tangent_at(curve, u, a.tangent))
+            place = corrected_point(curve, a.u + middle * a.tangent, a.tangent)
         except CorrectorFailed:
             break
         fold = curve.test_functions(place).fold
@@ -175,8 +181,7 @@ def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[floa
     cache: dict[float, CurvePoint] = {}
 
     def at(sigma: float) -> float:
-        u = _beside(curve, a, sigma)
-        cache[sigma] = CurvePoint(u, tangent_at(curve, u, a.tangent))
+        cache[sigma] = _beside(curve, a, sigma)
         return float(getattr(curve.test_functions(cache[sigma]), name))
 
     sigma = float(optimize.brentq(at, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
@@ -185,7 +190,7 @@ def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[floa
     return sigma, cache[sigma]
 
 
-def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> Floats:
+def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> CurvePoint:
     """The point of the curve at a distance from `a`.
 
     Next to a branch point the equations leave a second direction free, in which rounding alone would move
@@ -197,9 +202,10 @@ def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> Floats:
     """
     guess = a.u + distance * a.tangent
     try:
-        return newton_corrector(curve, guess, a.tangent)
+        u = newton_corrector(curve, guess, a.tangent)
     except CorrectorFailed:
-        return nearest_of_family(curve, guess, a.tangent)
+        u = nearest_of_family(curve, guess, a.tangent)
+    return CurvePoint(u, tangent_at(curve, u, a.tangent))
 
 
 def location_error(
@@ -215,9 +221,9 @@ def location_error(
         return _scatter(curve, a, sigma, place, step, name)
 
     def at(distance: float, own: PeriodicOrbitCurve = curve) -> tuple[float, Floats]:
-        u = _beside(own, a, distance)
-        there = CurvePoint(u, tangent_at(own, u, a.tangent))
-        return float(getattr(own.test_functions(there), name)), np.array([own.value(u), own.period(u)])
+        there = _beside(own, a, distance)
+        pair = np.array([own.value(there.u), own.period(there.u)])
+        return float(getattr(own.test_functions(there), name)), pair
 
     known = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
@@ -229,9 +235,8 @@ def location_error(
     if curve.pieces <= _SHORT:
         # Rounding is that of the largest numbers in the equations, which the value itself may not be.
         near = np.array([-1.0, -0.5, 0.5, 1.0])
-        table, powers = np.array([at(sigma + _NEAR * step * x)[1] for x in near]), np.vander(near, 3)
-        fitted = np.linalg.lstsq(powers, table, rcond=None)[0]
-        noise = np.abs(powers @ fitted - table).max(axis=0) + np.abs(fitted[2] - known)
+        noise, fitted = scatter(near, np.array([at(sigma + _NEAR * step * x)[1] for x in near]), 2)
+        noise = noise + np.abs(fitted[2] - known)
         value, period = value + _SURE * noise[0], period + _SURE * noise[1]
     return float(value), float(period)
 
@@ -243,19 +248,17 @@ def _scatter(
     near = np.linspace(-1.0, 1.0, _SAMPLES)
     seen = []
     for distance in sigma + _NEAR * step * near:
-        u = newton_corrector(curve, a.u + distance * a.tangent, a.tangent)
-        signs = curve.test_functions(CurvePoint(u, tangent_at(curve, u, a.tangent)))
+        there = corrected_point(curve, a.u + distance * a.tangent, a.tangent)
+        signs = curve.test_functions(there)
         turning = abs(signs.pair.imag)
         period = 2.0 * np.pi / turning if name == "complex_pair" and turning else np.nan
-        seen.append((float(getattr(signs, name)), curve.value(u), period))
-    table, powers = np.array(seen), np.vander(near, 3)
-    fitted = np.linalg.lstsq(powers, np.nan_to_num(table), rcond=None)[0]
-    noise = np.abs(powers @ fitted - table).max(axis=0)
+        seen.append((float(getattr(signs, name)), curve.value(there.u), period))
+    noise, fitted = scatter(near, np.array(seen), 2)
     slope = np.abs(fitted[1])
     # So far along the branch the zero may be off.
     off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
     value, period = _SURE * (noise[1:] + off * slope[1:])
-    return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(table[0, 2]))
+    return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(seen[0][2]))
 
 
 def point_at(

@@ -13,7 +13,7 @@ from udd.errors import ModelError
 from .equilibrium_curve import expansion
 from .flow_map import Floats, FlowMap
 from .pseudo_arclength import CorrectorFailed, natural_constraint, newton_corrector
-from .shooting_curve import HELD
+from .solution_curve import HELD
 
 __all__ = ["ConnectingCurve"]
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import operator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +15,15 @@ from numpy.typing import NDArray
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.labelled import of_states
-from udd.errors import ModelError
+from udd.errors import IntegrationError, ModelError
 from udd.models import Model
 
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
-from .pseudo_arclength import CurvePoint
-from .shooting_curve import HELD, PeriodicOrbitCurve
+from .orbit_geometry import crossings_of, extremes_of
+from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector
+from .shooting_curve import PeriodicOrbitCurve
+from .solution_curve import HELD
 from .solutions import Equilibrium, PeriodicOrbit
 
 if TYPE_CHECKING:
@@ -83,12 +87,10 @@ class BifurcationPoint(Drawable):
     @cached_property
     def lyapunov_error(self) -> float:
         """A bound of the error of the first Lyapunov coefficient; NaN of what is no Hopf bifurcation."""
-        from .branch_solutions import lyapunov_error_of
-
         curve, place = self._curve, self._place
         if self.kind != "Hopf" or not isinstance(curve, EquilibriumCurve) or place is None:
             return float("nan")
-        return lyapunov_error_of(curve, place, self.error)
+        return curve.lyapunov_error(place, self.error)
 
     @property
     def criticality(self) -> str:
@@ -155,8 +157,6 @@ class Branch(Drawable):
     @cached_property
     def extremes(self) -> tuple[Floats, Floats]:
         """The least and the largest value of each component on each orbit, two arrays of shape (n, dim)."""
-        from .orbit_geometry import extremes_of
-
         pairs = [extremes_of(curve, place.u) for curve, place in self._places]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
@@ -178,22 +178,18 @@ class Branch(Drawable):
         states : ndarray, shape (k, dim)
             The states there; of cycles that are not symmetric those of the mirror image are not among them.
         """
-        from .orbit_geometry import crossings_of
-
         return crossings_of(self, section, direction)
 
     @checked_arguments
     def solution(self, i: int) -> Equilibrium | PeriodicOrbit:
         """The equilibrium or cycle of one point of the branch."""
-        from .branch_solutions import solution_at
-
         try:
             curve, place = self._places[operator.index(i)]
         except IndexError:
             raise ModelError(
                 f"the branch has {len(self._places)} points, counted from 0: none is {i}"
             ) from None
-        return solution_at(curve, place.u)
+        return curve.solution(place.u)
 
     @checked_arguments
     def find(self, kind: str) -> list[BifurcationPoint]:
@@ -203,9 +199,20 @@ class Branch(Drawable):
     @checked_arguments
     def at(self, value: float) -> list[Equilibrium | PeriodicOrbit]:
         """The solutions at a value of the parameter, polished; more than one where the branch folds."""
-        from .branch_solutions import solutions_at
-
-        return solutions_at(self._places, self.values, value)
+        solutions: list[Equilibrium | PeriodicOrbit] = []
+        for i, (a, b) in enumerate(pairwise(self.values)):
+            if not min(a, b) <= value <= max(a, b) or (value == b and i + 2 < len(self)):
+                continue
+            curve, place = self._places[i if abs(value - a) <= abs(value - b) else i + 1]
+            guess = place.u.copy()
+            if abs(place.tangent[-1]) > 1e-3:
+                guess = guess + place.tangent * ((value / curve.scale - guess[-1]) / place.tangent[-1])
+            guess[-1] = value / curve.scale
+            with suppress(CorrectorFailed, IntegrationError):
+                curve = curve.anchored(place.u)
+                u = newton_corrector(curve, guess, natural_constraint(guess), patience=20)
+                solutions.append(curve.solution(u))
+        return solutions
 
     def to_xarray(self) -> xr.Dataset:
         """The branch as labelled arrays over ``place``: every state, the parameter, periods and multipliers.

@@ -22,7 +22,8 @@ from .equilibrium_curve import EquilibriumCurve
 from .flow_map import FlowMap, flow_of
 from .forced_orbits import require_period
 from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
-from .shooting_curve import HELD, PeriodicOrbitCurve
+from .shooting_curve import PeriodicOrbitCurve
+from .solution_curve import HELD
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["bounds_of", "branch_from", "continuation", "in_unit_of", "unit_of"]
@@ -200,8 +201,8 @@ def _at(
     start: Equilibrium | PeriodicOrbit, parameter: str, low: float, high: float
 ) -> tuple[AnyCurve, CurvePoint]:
     """The curve through a solution, and the place there."""
-    made = start._curve if isinstance(start, PeriodicOrbit) else None
-    forcing = None if made is None else made.flow.forcing
+    solved = start._solved if isinstance(start, PeriodicOrbit) else None
+    forcing = None if solved is None else solved[0].flow.forcing
     flow: FlowMap = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
     family = isinstance(start, PeriodicOrbit) and parameter not in flow.names
     if family and forcing is not None:
@@ -215,10 +216,10 @@ def _at(
         curve = EquilibriumCurve(flow, flow.values, index, unit_of(value, low, high))
         u = curve.pack(flow.reduced(start.state), value)
     else:
-        if start._curve is None or start._unknowns is None:
+        if solved is None:
             raise ModelError("this cycle was not made by udd.periodic_orbit")
-        old, span = start._curve, start._curve.span(start._unknowns)
-        nodes = old.nodes(start._unknowns)
+        old = solved[0]
+        nodes, span = old.nodes(solved[1]), old.span(solved[1])
         own = replace(old.flow, model=flow.model)
         kept = Conserved.of(own, parameter) if family and parameter != PERIOD else None
         if kept is not None:
@@ -230,12 +231,11 @@ def _at(
         u = curve.pack(nodes, span, value)
         if isinstance(curve, FamilyCurve):
             curve.require_one(u)
-        curve.fix_phase(u)
+        curve = curve.anchored(u)
     row = natural_constraint(u)
     try:
         u = newton_corrector(curve, u, row)
-        if isinstance(curve, PeriodicOrbitCurve):
-            curve.fix_phase(u)
+        curve = curve.anchored(u)
         return curve, CurvePoint(u, tangent_at(curve, u, row))
     except CorrectorFailed as error:
         reason = str(error)

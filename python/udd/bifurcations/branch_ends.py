@@ -9,7 +9,6 @@ from udd.errors import IntegrationError
 from .bifurcation_functions import FUNCTIONS
 from .bifurcation_location import bifurcations_between, location_error, point_at
 from .branch import AnyCurve, BifurcationPoint
-from .branch_solutions import solution_at
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
 from .periodic_orbits import half_of
@@ -99,7 +98,7 @@ def _nearest(curve: AnyCurve, guess: Floats, kind: str, step: float) -> Bifurcat
                 if met:
                     _, sigma, place, at = met[0]
                     errors = location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
-                    solution = solution_at(curve, place.u)
+                    solution = curve.solution(place.u)
                     found.append(point_at(curve, kind, place, at, solution, 0.0, errors))
                     break
                 here, signs = there, after

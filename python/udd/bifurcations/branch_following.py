@@ -16,7 +16,6 @@ from .bifurcation_functions import FUNCTIONS, TestFunctions
 from .bifurcation_location import bifurcations_between, location_error, pitchfork_at, point_at
 from .branch import AnyCurve, BifurcationPoint
 from .branch_ends import closes, hopf_end, origin_of, size_of, vanishing_part
-from .branch_solutions import solution_at
 from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import rounding_of
@@ -26,6 +25,7 @@ from .periodic_orbits import pieces_for
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
+    corrected_point,
     natural_constraint,
     newton_corrector,
     predictor_corrector_step,
@@ -170,14 +170,13 @@ class _Way(BranchTrace):
         with suppress(CorrectorFailed, IntegrationError):
             near = _BEFORE * distance
             tangent = here.place.tangent
-            u = newton_corrector(curve, here.place.u + near * tangent, tangent)
-            last = CurvePoint(u, tangent_at(curve, u, tangent))
-            if near > 0.0 and vanishing_part(curve, here.place.u, u) is None:
+            last = corrected_point(curve, here.place.u + near * tangent, tangent)
+            if near > 0.0 and vanishing_part(curve, here.place.u, last.u) is None:
                 after = curve.test_functions(last)
                 self.locate(here, near, after)
                 if self.end:
                     return True
-                if limits.low <= curve.value(u) <= limits.high:
+                if limits.low <= curve.value(last.u) <= limits.high:
                     self.places.append(Station(curve, last, after, here.arclength + near))
         if not limits.low <= point.value <= limits.high:
             return False
@@ -216,7 +215,7 @@ class _Way(BranchTrace):
     def note(self, there: Station, kind: str, errors: tuple[float, float]) -> None:
         """Note a bifurcation point; the way ends with the last one that is wanted."""
         curve, place, signs, arclength = there
-        point = point_at(curve, kind, place, signs, solution_at(curve, place.u), arclength, errors)
+        point = point_at(curve, kind, place, signs, curve.solution(place.u), arclength, errors)
         self.points.append(point)
         self.places.append(there)
         if self.limits.until(point):
@@ -274,12 +273,10 @@ def _prepared(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrb
         along = np.zeros((m, times, flow.dim))
         along[:, 0] = place.tangent[:-2].reshape(m, flow.dim)
         row = np.append(along.ravel(), place.tangent[-2:])
-        fine.fix_phase(u)
+        fine = fine.anchored(u)
         return fine, CurvePoint(u, tangent_at(fine, u, row))
-    fresh = replace(curve)
-    fresh.seen = curve.seen
-    fresh.fix_phase(place.u)
-    return fresh, CurvePoint(place.u, tangent_at(fresh, place.u, place.tangent))
+    curve = curve.anchored(place.u)
+    return curve, CurvePoint(place.u, tangent_at(curve, place.u, place.tangent))
 
 
 def _connection(way: BranchTrace) -> float | None:

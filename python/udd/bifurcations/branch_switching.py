@@ -14,7 +14,7 @@ from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve, expansion
 from .flow_map import Floats
 from .periodic_orbits import pieces_for
-from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at
+from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["born_at", "doubled"]
@@ -53,8 +53,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
 
     def at(size: float) -> CurvePoint | None:
         try:
-            u = newton_corrector(new, base + size * row, row, patience=20)
-            return CurvePoint(u, tangent_at(new, u, row))
+            return corrected_point(new, base + size * row, row, patience=20)
         except (CorrectorFailed, IntegrationError):
             return None
 
@@ -69,7 +68,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
                 break
             found, size = nearer, 0.5 * size
         if isinstance(new, PeriodicOrbitCurve):
-            new.fix_phase(found.u)
+            new = new.anchored(found.u)
             found = CurvePoint(found.u, tangent_at(new, found.u, row))
         return new, found, size
     where = f"the {point.kind} at {point.parameter} = {point.value:.10g}"
@@ -119,7 +118,7 @@ def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbit
     shift = curve.shift + curve.mirror * curve.shift
     new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
     base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
-    new.fix_phase(base)
+    new = new.anchored(base)
     if isinstance(new, FamilyCurve) and isinstance(curve, FamilyCurve):
         # Two rounds have the multiplier 1 twice here: one round separates conservation from bifurcation.
         new.free = curve.slope(u)
@@ -144,7 +143,7 @@ def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbi
     base = new.pack(rest, period, curve.value(place.u))
     row = new.pack(away, 0.0, 0.0)
     # At rest there is no flow: the phase is that of the ellipse, along which the linear law turns.
-    new.fix_phase_along(rest, away @ expansion(flow, values, x).by_state.T)
+    new = new.anchored_along(rest, away @ expansion(flow, values, x).by_state.T)
     return new, base, row / np.linalg.norm(row)
 
 
@@ -156,7 +155,4 @@ def _crossing(curve: AnyCurve, place: CurvePoint) -> tuple[AnyCurve, Floats, Flo
     known = place.tangent
     rest = free - np.outer(free @ known, known)
     row = rest[np.argmax(np.linalg.norm(rest, axis=1))]
-    fresh = replace(curve)
-    if isinstance(fresh, PeriodicOrbitCurve):
-        fresh.fix_phase(place.u)
-    return fresh, place.u, row / np.linalg.norm(row)
+    return curve.anchored(place.u), place.u, row / np.linalg.norm(row)

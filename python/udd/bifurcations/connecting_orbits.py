@@ -12,12 +12,14 @@ from udd.errors import IntegrationError, ModelError
 
 from .boundary_value import ConnectingCurve
 from .branch import Branch
-from .equilibrium_search import equilibrium_at, refined
+from .equilibrium_curve import equilibrium_at
+from .equilibrium_search import refined
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed
 from .saddle_node_cycles import saddle_node_on
-from .shooting_curve import HELD, PeriodicOrbitCurve
+from .shooting_curve import PeriodicOrbitCurve
+from .solution_curve import HELD
 from .solutions import Equilibrium
 
 __all__ = ["Connection", "connection", "found_by"]

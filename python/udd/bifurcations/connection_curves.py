@@ -19,7 +19,7 @@ from .pseudo_arclength import (
     predictor_corrector_step,
     tangent_at,
 )
-from .shooting_curve import HELD
+from .solution_curve import HELD
 
 __all__ = ["ConnectionWay"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from .flow_map import Floats, FlowMap
 from .pseudo_arclength import CurvePoint
 from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["PERIOD", "Conserved", "FamilyCurve", "in_a_family"]
+__all__ = ["PERIOD", "Conserved", "FamilyCurve"]
 
 PERIOD = "period"
 """The name of the parameter of a family without a given conserved quantity."""
@@ -26,7 +27,6 @@ PERIOD = "period"
 _KEPT = 1e-9  # of the sizes of its terms: a rate of change below is zero
 _PROBES = 16
 _FREE = 1e-5  # a singular value below this part of the largest is that of the family
-_EXACT = 1e-11  # below this part it is zero but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,27 +78,6 @@ class Conserved:
         return float(found["rate"][0]), slope
 
 
-def kept_by_the_map(curve: PeriodicOrbitCurve, u: Floats) -> tuple[Floats, Floats]:
-    """Left singular vectors (r, r) of the closing map less one beside the flow, and singular values (r,).
-
-    A value of zero is of something kept, along whose gradient its vector points: the left eigenvector of the
-    multiplier 1 across the flow.
-    """
-    size, start = curve.flow.size, curve.nodes(u)[0]
-    closing = curve.flow.scaled(curve.monodromy(u))
-    flow = curve.rate_at(curve.values_at(u), start) * curve.clock / size
-    left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(curve.flow.dim), flow]))
-    return left, sizes
-
-
-def in_a_family(curve: PeriodicOrbitCurve, u: Floats) -> bool:
-    """Whether cycles near by solve the equations as well, at the same parameters, to rounding."""
-    if curve.flow.forcing is not None or isinstance(curve, FamilyCurve):
-        return False
-    _, sizes = kept_by_the_map(curve, u)
-    return bool(sizes[-1] < _EXACT * sizes[0])
-
-
 def _plain(model: Model) -> dict[str, float]:
     return {name: value for name, value in model.parameters.items() if "." not in name}
 
@@ -145,10 +124,15 @@ class FamilyCurve(PeriodicOrbitCurve):
         """The time until the orbit closes."""
         return float(u[-1 if self.conserved is None else -2] * self.clock)
 
-    def fix_phase(self, u: Floats, first: bool = False) -> None:
-        """Take this orbit's first node for the reference, and see in which direction the last gap is free."""
-        super().fix_phase(u, first)
-        self.free = self.slope(u)
+    def anchored(self, u: Floats, first: bool = False) -> Self:
+        """Return the curve with this orbit as the reference, and the direction in which its gap is free."""
+        curve = super().anchored(u, first)
+        curve.free = curve.slope(u)
+        return curve
+
+    def is_in_a_family(self, u: Floats) -> bool:
+        """Return False: the period or the conserved quantity singles the cycle out."""
+        return False
 
     def slope(self, u: Floats) -> Floats:
         """The direction (r,), in scaled coordinates, in which the kept quantity grows at the first node."""
@@ -156,7 +140,7 @@ class FamilyCurve(PeriodicOrbitCurve):
         if self.conserved is not None:
             found: Floats = self.conserved.at(self.flow, start)[1] * size
             return found / (float(np.linalg.norm(found)) or 1.0)
-        kept, sizes = kept_by_the_map(self, u)
+        kept, sizes = self.kept_quantities(u)
         if self.free is None:
             return kept[:, -1]
         # Near a bifurcation the multiplier 1 comes twice as often: what is nearest to what was kept before.
@@ -171,7 +155,7 @@ class FamilyCurve(PeriodicOrbitCurve):
         ------
         ModelError
         """
-        _, sizes = kept_by_the_map(self, u)
+        _, sizes = self.kept_quantities(u)
         kept = int((sizes < _FREE * sizes[0]).sum())
         if kept == 0:
             raise ModelError("no quantity is kept: cycles of this model do not come in families")

@@ -12,7 +12,6 @@ from .bifurcation_functions import FUNCTIONS
 from .bifurcation_location import point_at
 from .branch import BifurcationPoint
 from .branch_continuation import continuation
-from .branch_solutions import solution_at
 from .connecting_orbits import Connection, connection
 from .locus_points import LocusPoint
 from .pseudo_arclength import CorrectorFailed
@@ -94,5 +93,5 @@ def _as_hopf(surface: SolutionSurface, there: SurfacePoint) -> list[BifurcationP
     pair = signs.pair
     if abs(pair.imag) * there.curve.flow.clock < 1e-4 or abs(pair.real) > 1e-6 * abs(pair.imag):
         return []
-    solution, nothing = solution_at(there.curve, u), (float("nan"), float("nan"))
+    solution, nothing = there.curve.solution(u), (float("nan"), float("nan"))
     return [point_at(there.curve, "Hopf", there.place, signs, solution, 0.0, nothing)]

@@ -14,7 +14,8 @@ from udd._util.drawable import Drawable
 from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch, cycles_of
-from .equilibrium_search import equilibrium_at, refined
+from .equilibrium_curve import equilibrium_at
+from .equilibrium_search import refined
 from .flow_map import Floats, FlowMap
 from .invariant_manifolds import direction_alone
 from .manifold_search import Accuracy, brackets, converge, distinct, secant

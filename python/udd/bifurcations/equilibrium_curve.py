@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -10,10 +10,17 @@ import numpy as np
 from udd import _core
 
 from .bifurcation_functions import STILL, TURNING, TestFunctions
+from .error_bounds import rounding_of, scatter
 from .flow_map import Floats, FlowMap
-from .pseudo_arclength import CurvePoint
+from .normal_forms import first_lyapunov_coefficient
+from .pseudo_arclength import CurvePoint, newton_corrector
+from .solution_curve import SolutionCurve
+from .solutions import Equilibrium, kind_of_rest
 
-__all__ = ["EquilibriumCurve", "expansion"]
+__all__ = ["EquilibriumCurve", "equilibrium_at", "expansion"]
+
+_SAMPLES = 12  # equilibria about a Hopf point, in which rounding shows,
+_NEAR = 1e-5  # so near along the branch
 
 
 @dataclass(frozen=True)
@@ -42,29 +49,26 @@ def expansion(flow: FlowMap, values: Floats, x: Floats, higher: bool = False, t:
     )
 
 
+def equilibrium_at(flow: FlowMap, values: Floats, x: Floats) -> Equilibrium:
+    """Return the equilibrium at a state with its eigenvalues, kind and Lyapunov coefficient."""
+    here = expansion(flow, values, x, higher=True)
+    eigenvalues = np.linalg.eigvals(here.by_state).astype(complex)
+    eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
+    residual = float(np.abs(here.rate * flow.clock / flow.size).max())
+    coefficient = first_lyapunov_coefficient(here.by_state, here.second, here.third)
+    model = flow.with_values(values)
+    return Equilibrium(model, flow.full(x), eigenvalues, kind_of_rest(eigenvalues), residual, coefficient)
+
+
 @dataclass(eq=False)
-class EquilibriumCurve:
-    """Scaled equilibria and the parameter: ``u = (x / size, parameter / scale)``.
+class EquilibriumCurve(SolutionCurve):
+    """Scaled equilibria and the parameter: ``u = (x / size, parameter / scale)``."""
 
-    `values` are the model's parameters, of which the one with the index `parameter` is varied.
-    """
-
-    flow: FlowMap
-    values: Floats
-    parameter: int
-    scale: float
-    second: int = -1
-    _rates: Floats = field(init=False)
-
-    def __post_init__(self) -> None:
-        # Rates are compared with what crosses the typical size in the typical time.
-        self._rates = self.flow.clock / self.flow.size
-
-    def with_second(self, index: int, value: float) -> EquilibriumCurve:
-        """The curve at another value of a second parameter, by which derivatives are wanted too."""
-        values = self.values.copy()
-        values[index] = value
-        return replace(self, values=values, second=index)
+    @property
+    def _rates(self) -> Floats:
+        """The unit of the rates: they are compared with what crosses the typical size in the typical time."""
+        unit: Floats = self.flow.clock / self.flow.size
+        return unit
 
     def by_second(self, u: Floats, scale: float) -> Floats:
         """The scaled rates' derivatives by the second parameter, in these units of it."""
@@ -79,21 +83,6 @@ class EquilibriumCurve:
         """The reduced state."""
         return u[:-1] * self.flow.size
 
-    @property
-    def name(self) -> str:
-        """The parameter's name."""
-        return self.flow.names[self.parameter]
-
-    def value(self, u: Floats) -> float:
-        """The parameter's value."""
-        return float(u[-1] * self.scale)
-
-    def values_at(self, u: Floats) -> Floats:
-        """All parameters."""
-        values = self.values.copy()
-        values[self.parameter] = self.value(u)
-        return values
-
     def at(self, u: Floats) -> Expansion:
         """The rates and their first derivatives."""
         return expansion(self.flow, self.values_at(u), self.state(u))
@@ -106,6 +95,21 @@ class EquilibriumCurve:
         return here.rate * self._rates, np.column_stack([by_state, by_value])
 
     kind = "equilibrium"
+
+    def solution(self, u: Floats) -> Equilibrium:
+        """Return the equilibrium with these unknowns."""
+        return equilibrium_at(self.flow, self.values_at(u), self.state(u))
+
+    def lyapunov_error(self, place: CurvePoint, error: float) -> float:
+        """Return a bound of the error of the first Lyapunov coefficient if the parameter has this error.
+
+        From the scatter of its values near by, and from how it changes along the branch.
+        """
+        near = np.linspace(-1.0, 1.0, _SAMPLES)
+        points = (newton_corrector(self, place.u + _NEAR * x * place.tangent, place.tangent) for x in near)
+        noise, fitted = scatter(near, np.array([self.solution(u).lyapunov_coefficient for u in points]), 2)
+        off = error / max(abs(float(place.tangent[-1])) * self.scale, 1e-300) / _NEAR
+        return 2.0 * (float(noise) + abs(float(fitted[1])) * off) + float(rounding_of(fitted[2]))
 
     def first_state(self, u: Floats) -> Floats:
         """Return the equilibrium as a state (dim,) of the model."""

@@ -18,14 +18,13 @@ from udd.errors import ModelError
 from udd.models import Model, require_model
 
 from .degenerate_roots import Law, degenerate_root
-from .equilibrium_curve import expansion
+from .equilibrium_curve import equilibrium_at, expansion
 from .flow_map import Floats, FlowMap, flow_of
 from .homotopy import bezout_number, complex_roots
-from .normal_forms import first_lyapunov_coefficient
 from .polynomials import Polynomials, numerators_of, taylor_at
-from .solutions import Equilibrium, FoundList, kind_of_rest
+from .solutions import Equilibrium, FoundList
 
-__all__ = ["Equilibria", "equilibria", "equilibrium_at", "refined"]
+__all__ = ["Equilibria", "equilibria", "refined"]
 
 _SAME = 1e-7  # two within this part of the typical sizes are one
 _REST = 1e-9  # rates, in typical sizes per typical time, that are as good as none
@@ -282,17 +281,6 @@ def _apart(flow: FlowMap, a: Floats, b: Floats) -> bool:
     """Whether two states differ, by more than whole turns of angles."""
     gap = a - b
     return bool(np.abs((gap + flow.turns(gap)) / flow.size).max() > _SAME)
-
-
-def equilibrium_at(flow: FlowMap, values: Floats, x: Floats) -> Equilibrium:
-    """Return the equilibrium at a state with its eigenvalues, kind and Lyapunov coefficient."""
-    here = expansion(flow, values, x, higher=True)
-    eigenvalues = np.linalg.eigvals(here.by_state).astype(complex)
-    eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
-    residual = float(np.abs(here.rate * flow.clock / flow.size).max())
-    coefficient = first_lyapunov_coefficient(here.by_state, here.second, here.third)
-    model = flow.with_values(values)
-    return Equilibrium(model, flow.full(x), eigenvalues, kind_of_rest(eigenvalues), residual, coefficient)
 
 
 def refined(flow: FlowMap, values: Floats, guess: Floats, known: Sequence[Floats] = ()) -> Floats | None:

@@ -10,9 +10,8 @@ from scipy import optimize
 
 from udd.errors import IntegrationError
 
-from .branch_solutions import solution_at
 from .equilibrium_curve import EquilibriumCurve, expansion
-from .error_bounds import COARSE, rounding_of
+from .error_bounds import COARSE, rounding_of, scatter
 from .flow_map import Floats
 from .normal_forms import (
     Derivatives,
@@ -94,8 +93,7 @@ class Segment:
         """The step with less accurate runs."""
         curve, surface = self.surface.curve, self.surface
         assert isinstance(curve, PeriodicOrbitCurve)
-        less = SolutionSurface(replace(curve, loose=COARSE), surface.second, surface.scale)
-        return replace(self, surface=less)
+        return replace(self, surface=replace(surface, curve=replace(curve, loose=COARSE)))
 
     def at(self, part: float) -> SurfacePoint:
         """The point of the curve at a part of the way.
@@ -259,7 +257,7 @@ def _point(
         errors = np.full(len(known), np.nan)
     names = curve.name, curve.flow.names[surface.second]
     bounds = dict(zip(numbers, errors[2:].tolist(), strict=True))
-    solution = solution_at(curve, place.v[:-1])
+    solution = curve.solution(place.v[:-1])
     return LocusPoint(kind, names, known[:2], errors[:2], solution, numbers, bounds, surface, place)
 
 
@@ -269,16 +267,14 @@ def _scatter(kind: str, segment: Segment, part: float, function: Callable[[Surfa
     From how the values near by scatter about a smooth curve; of cycles also how far they move if the runs are
     less accurate.
     """
-    near = np.linspace(-1.0, 1.0, _SAMPLES)
 
     def seen(where: float, own: Segment = segment) -> list[float]:
         point = own.at(where)
         return [function(point), *own.surface.values(point), *_coefficients(kind, point).values()]
 
-    table, powers = np.array([seen(part + _ASIDE * x) for x in near]), np.vander(near, 4)
-    fitted = np.linalg.lstsq(powers, table, rcond=None)[0]
-    noise, slope = np.abs(powers @ fitted - table).max(axis=0), np.abs(fitted[2])
-    gap = noise[0]
+    near = np.linspace(-1.0, 1.0, _SAMPLES)
+    noise, fitted = scatter(near, np.array([seen(part + _ASIDE * x) for x in near]), 3)
+    gap, slope = noise[0], np.abs(fitted[2])
     if isinstance(segment.surface.curve, PeriodicOrbitCurve):
         moved = np.abs(np.array(seen(part, segment.coarse())) - seen(part))
         gap, noise = gap + moved[0], noise + moved

@@ -6,7 +6,7 @@ import numpy as np
 
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at
+from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point
 
 __all__ = ["corner_ahead"]
 
@@ -64,13 +64,13 @@ def _approached(
             return CurvePoint(place.u + distance * place.tangent, place.tangent)
         guess = place.u + part * min(distance, step) * place.tangent
         try:
-            u = newton_corrector(curve, guess, place.tangent)
-            if side * float(curve.at(u).surfaces[j]) <= 0.0:
+            there = corrected_point(curve, guess, place.tangent)
+            if side * float(curve.at(there.u).surfaces[j]) <= 0.0:
                 raise CorrectorFailed("the step leads over the surface")
         except CorrectorFailed:
             part *= 0.5
             continue
-        place = CurvePoint(u, tangent_at(curve, u, place.tangent))
+        place = there
     return None
 
 

@@ -11,10 +11,9 @@ from .bifurcation_location import location_error, point_at
 from .branch import BifurcationPoint, Branch
 from .branch_continuation import branch_from
 from .branch_following import BranchTrace, Station
-from .branch_solutions import solution_at
 from .branch_switching import doubled
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, CurvePoint, newton_corrector, tangent_at
+from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["next_doubling"]
@@ -62,12 +61,11 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         # The part across the amplitude grows with its square.
         guess = base + square**0.5 * row + bent * (square / before**2 if before else 0.0)
         try:
-            u = newton_corrector(new, guess, row)
-            place = CurvePoint(u, tangent_at(new, u, row))
+            place = corrected_point(new, guess, row)
         except IntegrationError as error:
             raise CorrectorFailed(str(error)) from None
         found[square] = place, new.test_functions(place)
-        return u
+        return place.u
 
     square = amplitude**2
     u = at(square, base)
@@ -99,7 +97,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     errors = location_error(
         new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
     )
-    own = point_at(new, _KIND, place, signs, solution_at(new, place.u), size, errors)
+    own = point_at(new, _KIND, place, signs, new.solution(place.u), size, errors)
     # Orbits beyond the doubling, from the secant method, are left out.
     places = [Station(new, *found[s], s**0.5) for s in sorted(found) if s <= square]
     way = BranchTrace(places, [own], "the point that was wanted")

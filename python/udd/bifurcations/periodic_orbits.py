@@ -20,18 +20,18 @@ from udd.models import Model, beyond_the_edge, require_model
 from udd.models.parameter_batch import default_state
 from udd.simulation.trajectory import simulate
 
-from .floquet_multipliers import multipliers_at
 from .flow_map import Floats, FlowMap, flow_of
 from .forced_orbits import forcing_of, repeats
 from .model_states import state_of_attractor
 from .pseudo_arclength import CorrectorFailed, natural_constraint, nearest_of_family, newton_corrector
-from .shooting_curve import HELD, PeriodicOrbitCurve
+from .shooting_curve import PeriodicOrbitCurve
+from .solution_curve import HELD
 from .solutions import PeriodicOrbit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["closed", "cycle_at", "flown", "half_of", "periodic_orbit", "pieces_for"]
+__all__ = ["closed", "flown", "half_of", "periodic_orbit", "pieces_for"]
 
 _FINE = 64  # states looked at in a typical time
 _CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
@@ -168,26 +168,14 @@ def pieces_for(flow: FlowMap, span: float) -> int:
     return max(3, math.ceil(2.0 * span / flow.clock))
 
 
-def cycle_at(curve: PeriodicOrbitCurve, u: Floats) -> PeriodicOrbit:
-    """The cycle that solves a curve's equations."""
-    flow, values = curve.flow, curve.values_at(u)
-    multipliers = curve.ordered(multipliers_at(curve, u).values)
-    residual, _ = curve.equations(u)
-    nodes = flow.full(curve.nodes(u))
-    model = flow.with_values(values)
-    gap = float(np.abs(residual).max())
-    return PeriodicOrbit(model, nodes[0], curve.period(u), multipliers, curve.symmetric, nodes, gap, curve, u)
-
-
 def _polished(
     model: Model, flow: FlowMap, nodes: Floats, span: float, mirror: Floats, shift: Floats
 ) -> PeriodicOrbit:
     """The cycle that Newton's method finds, in its simplest form."""
     curve, u = closed(flow, nodes, span, mirror, shift)
     curve, u = _simplest(curve, u)
-    found = cycle_at(curve, u)
     # The model as it was given: its edge too.
-    return replace(found, model=model)
+    return replace(curve.solution(u), model=model)
 
 
 def closed(
@@ -203,7 +191,7 @@ def closed(
         flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes, np.zeros_like(nodes), share
     )
     guess = curve.pack(nodes, span, value)
-    curve.fix_phase(guess, first=True)  # the state that is returned is the one near the guess
+    curve = curve.anchored(guess, first=True)  # the state that is returned is the one near the guess
     tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
     row = natural_constraint(guess)
     # Where energy is kept cycles come in families: near one the equations leave a direction nearly free.
@@ -248,8 +236,7 @@ def half_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[str, PeriodicOrbitCur
         if np.abs((gap + shift) / flow.size).max() < _HALF:
             share = curve.share / 2.0
             own = replace(curve, pieces=len(nodes) - 1, mirror=mirror, shift=shift, share=share)
-            own.fix_phase(own.pack(nodes[:-1], half, curve.value(u)))
-            return kind, own, nodes[:-1]
+            return kind, own.anchored(own.pack(nodes[:-1], half, curve.value(u))), nodes[:-1]
     return "", curve, nodes[:-1]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,8 +16,10 @@ __all__ = [
     "CorrectorFailed",
     "Curve",
     "CurvePoint",
+    "corrected_point",
     "natural_constraint",
     "nearest_of_family",
+    "newton",
     "newton_corrector",
     "predictor_corrector_step",
     "tangent_at",
@@ -28,7 +31,6 @@ _MOST = 8  # Newton steps from a good guess
 _TURN = 0.95  # least cosine between one tangent and the next
 _MOVED = 0.25  # of a step, from the tangent to the curve
 _STRAIGHT = 0.995  # from here on the next step may be longer
-_DENSE = 60  # unknowns up to which a dense matrix is as fast
 
 
 class CorrectorFailed(Exception):
@@ -87,12 +89,10 @@ def natural_constraint(u: Floats) -> Floats:
     return row
 
 
-def newton_corrector(
-    curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, longest: float = np.inf
+def newton(
+    step_at: Callable[[Floats], Floats], guess: Floats, patience: int = _MOST, longest: float = np.inf
 ) -> Floats:
-    """Return the point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
-
-    No component changes by more than `longest` in one step.
+    """Return where steps from a guess arrive; no component changes by more than `longest` in one of them.
 
     Raises
     ------
@@ -101,10 +101,9 @@ def newton_corrector(
     u, before = guess.copy(), np.inf
     for _ in range(patience):
         try:
-            residual, matrix = curve.equations(u)
+            step = step_at(u)
         except IntegrationError as error:
             raise CorrectorFailed(str(error)) from None
-        step = solve(matrix, row, np.append(-residual, row @ (guess - u)))
         size = float(np.abs(step).max())
         if not np.isfinite(size) or (size > 1e3 and longest > 1e3):
             raise CorrectorFailed("Newton's method diverges")
@@ -115,10 +114,38 @@ def newton_corrector(
     raise CorrectorFailed("Newton's method does not converge")
 
 
+def newton_corrector(
+    curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, longest: float = np.inf
+) -> Floats:
+    """Return the point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
+
+    Raises
+    ------
+    CorrectorFailed
+    """
+
+    def step_at(u: Floats) -> Floats:
+        residual, matrix = curve.equations(u)
+        return solve(matrix, row, np.append(-residual, row @ (guess - u)))
+
+    return newton(step_at, guess, patience, longest)
+
+
+def corrected_point(curve: Curve, guess: Floats, along: Floats, patience: int = _MOST) -> CurvePoint:
+    """Return the point of the curve across `along`, with the tangent in the same sense.
+
+    Raises
+    ------
+    CorrectorFailed, IntegrationError
+    """
+    u = newton_corrector(curve, guess, along, patience)
+    return CurvePoint(u, tangent_at(curve, u, along))
+
+
 def nearest_of_family(
     curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, singular: float = 1e-7
 ) -> Floats:
-    """A solution in the plane through `guess` of equations that are singular but can be solved.
+    """Return a solution in the plane through `guess` of equations that are singular but can be solved.
 
     By the method of Gauss and Newton: each step is the shortest of those that solve the linear equations;
     singular values below `singular` times the largest count as zero.
@@ -127,20 +154,14 @@ def nearest_of_family(
     ------
     CorrectorFailed
     """
-    u, before = guess.copy(), np.inf
-    for _ in range(patience):
+
+    def step_at(u: Floats) -> Floats:
         residual, matrix = curve.equations(u)
         dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
         full, right = np.vstack([dense, row]), np.append(-residual, row @ (guess - u))
-        step = np.linalg.lstsq(full, right, rcond=singular)[0]
-        size = float(np.abs(step).max())
-        if not np.isfinite(size) or size > 1e3:
-            break
-        u = u + step
-        if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
-            return u
-        before = size
-    raise CorrectorFailed("Newton's method does not converge")
+        return np.asarray(np.linalg.lstsq(full, right, rcond=singular)[0], dtype=np.float64)
+
+    return newton(step_at, guess, patience)
 
 
 def tangent_at(curve: Curve, u: Floats, along: Floats) -> Floats:
@@ -165,16 +186,15 @@ def predictor_corrector_step(
     while step >= shortest:
         try:
             guess = here.u + step * here.tangent
-            u = newton_corrector(curve, guess, here.tangent)
-            tangent = tangent_at(curve, u, here.tangent)
+            there = corrected_point(curve, guess, here.tangent)
         except (CorrectorFailed, IntegrationError) as error:
             step, reason = 0.5 * step, str(error)
             continue
-        turn = float(tangent @ here.tangent)
+        turn = float(there.tangent @ here.tangent)
         # A curve that turns no more does not move further: it would be another one.
-        if turn < _TURN or np.linalg.norm(u - guess) > _MOVED * step:
+        if turn < _TURN or np.linalg.norm(there.u - guess) > _MOVED * step:
             step *= 0.5
             continue
         # Where the curve is nearly straight steps may grow.
-        return CurvePoint(u, tangent), step, min(step * (1.5 if turn > _STRAIGHT else 1.0), longest)
+        return there, step, min(step * (1.5 if turn > _STRAIGHT else 1.0), longest)
     raise CorrectorFailed(reason)

@@ -11,7 +11,6 @@ from udd.errors import ModelError
 
 from .branch import Branch
 from .flow_map import Floats, FlowMap
-from .periodic_orbits import cycle_at
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import PeriodicOrbit
 
@@ -50,7 +49,7 @@ class SaddleCycle:
         turned = left.real * (right[:, place] @ left).real  # both may have been scaled by the same phase
         norm, state = float(np.linalg.norm(vector)), curve.nodes(u)[0]
         rate, number = curve.rate_at(values, state) / flow.size, float(numbers[place].real)
-        value, cycle = curve.value(u), cycle_at(curve, u)
+        value, cycle = curve.value(u), curve.solution(u)
         return cls(flow, values, value, state, rate, vector / norm, turned * norm, number, cycle)
 
     def facing(self, other: SaddleCycle | None) -> SaddleCycle:
@@ -113,8 +112,8 @@ def saddle_at(branch: Branch, value: float, like: SaddleCycle, growing: bool = T
     """
     cycles = [orbit for orbit in branch.at(value) if isinstance(orbit, PeriodicOrbit)]
     for orbit in sorted(cycles, key=lambda orbit: float(like.distance(like.flow.reduced(orbit.state)))):
-        assert orbit._curve is not None and orbit._unknowns is not None
-        saddle = SaddleCycle.of(orbit._curve, orbit._unknowns, growing)
+        assert orbit._solved is not None
+        saddle = SaddleCycle.of(*orbit._solved, growing)
         if saddle is not None:
             return saddle.facing(like)
     raise ModelError(f"no saddle cycle is found at {value:.10g}")

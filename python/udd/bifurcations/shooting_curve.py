@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Self
 
 import numpy as np
 
+from udd.errors import IntegrationError
+
 from .bifurcation_functions import STILL, TURNING, TestFunctions, product_less
 from .condensation import CyclicEquations
+from .error_bounds import COARSE, rounding_of
 from .floquet_multipliers import Multipliers, multipliers_at
-from .flow_map import Floats, FlowMap, SegmentEnds
-from .pseudo_arclength import _DENSE, CurvePoint
+from .flow_map import Floats, SegmentEnds
+from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector
+from .solution_curve import HELD, SolutionCurve
+from .solutions import PeriodicOrbit
 
-__all__ = ["HELD", "PeriodicOrbitCurve"]
+__all__ = ["PeriodicOrbitCurve"]
 
-HELD = -1
-"""The index of a parameter that the model does not have: a cycle alone needs none."""
+_DENSE = 60  # unknowns up to which a dense matrix is as fast
+_EXACT = 1e-11  # a singular value below this part of the largest is zero but for rounding
 
 
 def _planes(rates: Floats) -> Floats:
@@ -29,7 +35,7 @@ def _planes(rates: Floats) -> Floats:
 
 
 @dataclass(eq=False)
-class PeriodicOrbitCurve:
+class PeriodicOrbitCurve(SolutionCurve):
     """Scaled nodes of an orbit that closes after the time `span`, and that time, and the parameter.
 
     The orbit is cut into pieces of equal time. The end of the last one, reflected by the signs of `mirror`
@@ -40,12 +46,6 @@ class PeriodicOrbitCurve:
 
     Attributes
     ----------
-    flow : FlowMap
-    values : ndarray
-        The model's parameters, of which the one with the index `parameter` is varied: `HELD` where there are
-        none.
-    scale : float
-        The unit of the parameter in the unknowns.
     clock : float
         The unit of time in the unknowns.
     pieces : int
@@ -57,14 +57,10 @@ class PeriodicOrbitCurve:
         The nodes of the reference orbit, and the weights of the nodes' distances from them.
     share : float
         Of a forced model: after how many of the forcing's periods the orbit closes.
-    second : int
-        The index of another parameter by which derivatives are wanted, `HELD` for none.
+    loose : float
+        Multiplies the tolerances of the runs.
     """
 
-    flow: FlowMap
-    values: Floats
-    parameter: int
-    scale: float
     clock: float
     pieces: int
     mirror: Floats
@@ -72,15 +68,8 @@ class PeriodicOrbitCurve:
     reference: Floats
     across: Floats
     share: float = 1.0
-    second: int = HELD
     loose: float = 1.0
-    seen: tuple[Floats, SegmentEnds] | None = field(default=None, init=False)
-
-    def with_second(self, index: int, value: float) -> PeriodicOrbitCurve:
-        """The curve at another value of a second parameter, by which derivatives are wanted too."""
-        values = self.values.copy()
-        values[index] = value
-        return replace(self, values=values, second=index)
+    _last: dict[bytes, SegmentEnds] = field(default_factory=dict, init=False, repr=False)
 
     def pack(self, nodes: Floats, span: float, value: float) -> Floats:
         """Unknowns from nodes (m, r), the time and the parameter's value."""
@@ -106,35 +95,21 @@ class PeriodicOrbitCurve:
         """The time until the orbit is back at its start."""
         return self.span(u) * (2.0 if self.symmetric else 1.0)
 
-    @property
-    def name(self) -> str:
-        """The parameter's name."""
-        return self.flow.names[self.parameter]
-
-    def value(self, u: Floats) -> float:
-        """The parameter's value."""
-        return float(u[-1] * self.scale)
-
-    def values_at(self, u: Floats) -> Floats:
-        """All parameters."""
-        values = self.values.copy()
-        if self.parameter != HELD:
-            values[self.parameter] = self.value(u)
-        return values
-
-    def fix_phase(self, u: Floats, first: bool = False) -> None:
-        """Take this orbit for the reference; of its nodes only the `first` where that is asked for."""
+    def anchored(self, u: Floats, first: bool = False) -> Self:
+        """Return the curve with this orbit as the reference, or with the `first` of its nodes alone."""
         if self.flow.forcing is not None:
-            return
+            return self
         rates = self._rates_at_nodes(u)
         if first:
             rates[1:] = 0.0
-        self.fix_phase_along(self.nodes(u), rates)
+        return self.anchored_along(self.nodes(u), rates)
 
-    def fix_phase_along(self, nodes: Floats, rates: Floats) -> None:
-        """Take these nodes (m, r) for the reference; orbits do not move along these rates (m, r) from it."""
-        self.reference = nodes
-        self.across = rates / np.linalg.norm(rates / self.flow.size) / self.flow.size**2
+    def anchored_along(self, nodes: Floats, rates: Floats) -> Self:
+        """Return the curve of orbits that do not move along these rates (m, r) from reference nodes."""
+        across = rates / np.linalg.norm(rates / self.flow.size) / self.flow.size**2
+        curve = replace(self, reference=nodes, across=across)
+        curve._last = self._last  # runs do not depend on the phase
+        return curve
 
     def begins(self, u: Floats) -> Floats:
         """When the pieces begin (m,); always at 0 where the law does not ask."""
@@ -149,12 +124,14 @@ class PeriodicOrbitCurve:
 
     def flight(self, u: Floats) -> SegmentEnds:
         """Where the pieces end, with derivatives by the parameter."""
-        if self.seen is None or not np.array_equal(self.seen[0], u):
+        key = u.tobytes()
+        if key not in self._last:
             spans = np.full(self.pieces, self.span(u) / self.pieces)
             wanted = tuple(index for index in (self.parameter, self.second) if index != HELD)
-            found = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, self.loose, self.begins(u))
-            self.seen = u.copy(), found
-        return self.seen[1]
+            ends = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, self.loose, self.begins(u))
+            self._last.clear()
+            self._last[key] = ends
+        return self._last[key]
 
     def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
         """Scaled gaps between the pieces and the phase, and their derivatives."""
@@ -238,6 +215,57 @@ class PeriodicOrbitCurve:
         return np.ascontiguousarray(factors)
 
     kind = "cycle"
+
+    def solution(self, u: Floats) -> PeriodicOrbit:
+        """Return the cycle with these unknowns."""
+        multipliers = self.ordered(multipliers_at(self, u).values)
+        gap = float(np.abs(self.equations(u)[0]).max())
+        nodes, model = self.flow.full(self.nodes(u)), self.flow.with_values(self.values_at(u))
+        return PeriodicOrbit(
+            model, nodes[0], self.period(u), multipliers, self.symmetric, nodes, gap, (self, u)
+        )
+
+    def multiplier_errors(self, u: Floats) -> Floats:
+        """Return bounds of the errors of the multipliers over the period, to first order."""
+        closing = multipliers_at(self, u)
+        # A symmetric cycle's are the squares of those of half a round.
+        rounds = 2.0 if self.symmetric else 1.0
+        sizes = np.abs(closing.values) ** rounds
+        errors: Floats = (rounds * sizes * closing.error)[np.argsort(-sizes, kind="stable")]
+        return errors
+
+    def period_error(self, u: Floats) -> float:
+        """Return a bound of the error of the period: how far it moves if runs are less accurate.
+
+        A member of a family has no bound unless its period or energy is fixed: less accurate runs find
+        another.
+        """
+        if self.is_in_a_family(u):
+            return float("nan")
+        period, coarse = self.period(u), replace(self, loose=COARSE)
+        try:
+            moved = coarse.period(newton_corrector(coarse, u, natural_constraint(u)))
+        except (CorrectorFailed, IntegrationError):
+            return float("nan")
+        return float(abs(moved - period) + rounding_of(period))
+
+    def kept_quantities(self, u: Floats) -> tuple[Floats, Floats]:
+        """Left singular vectors (r, r) of the closing map less 1 with the flow, and singular values (r,).
+
+        A value of zero belongs to a conserved quantity: its vector points along the gradient, which is the
+        left eigenvector of the multiplier 1 across the flow.
+        """
+        closing = self.flow.scaled(self.monodromy(u))
+        rate = self.rate_at(self.values_at(u), self.nodes(u)[0]) * self.clock / self.flow.size
+        left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(self.flow.dim), rate]))
+        return left, sizes
+
+    def is_in_a_family(self, u: Floats) -> bool:
+        """Return True if cycles near by solve the equations at the same parameters, to rounding."""
+        if self.flow.forcing is not None:
+            return False
+        _, sizes = self.kept_quantities(u)
+        return bool(sizes[-1] < _EXACT * sizes[0])
 
     def first_state(self, u: Floats) -> Floats:
         """Return the first node as a state (dim,) of the model."""

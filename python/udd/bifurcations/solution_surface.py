@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize
@@ -12,7 +12,7 @@ from udd.errors import IntegrationError
 from .bifurcation_functions import TestFunctions
 from .branch import AnyCurve
 from .flow_map import Floats
-from .pseudo_arclength import _ENOUGH, _MOST, _NOISE, CorrectorFailed, CurvePoint, solve
+from .pseudo_arclength import CorrectorFailed, CurvePoint, newton, solve
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["SolutionSurface", "SurfacePoint"]
@@ -55,6 +55,7 @@ class SurfacePoint:
         return along
 
 
+@dataclass(frozen=True, eq=False)
 class SolutionSurface:
     """Solutions over two parameters, the second of them in units of `scale`.
 
@@ -62,8 +63,9 @@ class SolutionSurface:
     curve of folds turns in both, are points like others.
     """
 
-    def __init__(self, curve: AnyCurve, second: int, scale: float) -> None:
-        self.curve, self.second, self.scale = curve, second, scale
+    curve: AnyCurve
+    second: int
+    scale: float
 
     def values(self, point: SurfacePoint) -> Floats:
         """Both parameters."""
@@ -97,37 +99,25 @@ class SolutionSurface:
         ------
         CorrectorFailed
         """
-        v, before = guess.copy(), np.inf
         first, second = near.plane
-        for _ in range(_MOST):
-            curve = self._curve_at(v)
-            try:
-                residual, matrix = curve.equations(v[:-1])
-                column = curve.by_second(v[:-1], self.scale)
-            except IntegrationError as error:
-                raise CorrectorFailed(str(error)) from None
-            gap = guess - v
+
+        def step_at(v: Floats) -> Floats:
+            curve, gap = self._curve_at(v), guess - v
+            residual, matrix = curve.equations(v[:-1])
+            column = curve.by_second(v[:-1], self.scale)
             begin = solve(matrix, first[:-1], np.append(-residual, first @ gap))
             by_second = solve(matrix, first[:-1], np.append(column, first[-1]))
             more = (second @ gap - second[:-1] @ begin) / (second[-1] - second[:-1] @ by_second)
-            step = np.append(begin - more * by_second, more)
-            size = float(np.abs(step).max())
-            if not np.isfinite(size) or size > 1e3:
-                raise CorrectorFailed("Newton's method diverges")
-            v = v + step
-            if size < _ENOUGH or (size < _NOISE and size > 0.1 * before):
-                return self._at(v, first, second)
-            before = size
-        raise CorrectorFailed("Newton's method does not converge")
+            return np.append(begin - more * by_second, more)
 
-    def fix_phase(self, point: SurfacePoint) -> SurfacePoint:
-        """Take this solution for the reference of the phase."""
-        if isinstance(self.curve, PeriodicOrbitCurve):
-            self.curve = self._curve_at(point.v)
-            assert isinstance(self.curve, PeriodicOrbitCurve)
-            self.curve.fix_phase(point.v[:-1])
-            return self._at(point.v, *point.plane)
-        return point
+        return self._at(newton(step_at, guess), first, second)
+
+    def anchored(self, point: SurfacePoint) -> tuple[SolutionSurface, SurfacePoint]:
+        """Return the surface with this solution as the reference of the phase, and the point on it."""
+        if not isinstance(self.curve, PeriodicOrbitCurve):
+            return self, point
+        surface = replace(self, curve=self._curve_at(point.v).anchored(point.v[:-1]))
+        return surface, surface._at(point.v, *point.plane)
 
     def slope(self, point: SurfacePoint, name: str) -> Floats:
         """The derivatives (2,) of a test function along the plane, by central differences."""

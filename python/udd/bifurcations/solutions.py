@@ -132,8 +132,7 @@ class PeriodicOrbit(Drawable):
     symmetric: bool
     nodes: Floats
     residual: float
-    _curve: PeriodicOrbitCurve | None = field(default=None, repr=False)
-    _unknowns: Floats | None = field(default=None, repr=False)
+    _solved: tuple[PeriodicOrbitCurve, Floats] | None = field(default=None, repr=False)
 
     @property
     def stable(self) -> bool:
@@ -143,16 +142,10 @@ class PeriodicOrbit(Drawable):
     @cached_property
     def multiplier_errors(self) -> Floats:
         """Bounds of the errors of the multipliers, to first order; NaN if their curve is not known."""
-        from .floquet_multipliers import multipliers_at
-
-        if self._curve is None or self._unknowns is None:
+        if self._solved is None:
             return np.full(len(self.multipliers), np.nan)
-        found = multipliers_at(self._curve, self._unknowns)
-        # A symmetric cycle's are the squares of those of half a round.
-        rounds = 2.0 if self.symmetric else 1.0
-        sizes = np.abs(found.values) ** rounds
-        errors: Floats = (rounds * sizes * found.error)[np.argsort(-sizes, kind="stable")]
-        return errors
+        curve, u = self._solved
+        return curve.multiplier_errors(u)
 
     @property
     def neutral(self) -> bool:
@@ -165,11 +158,10 @@ class PeriodicOrbit(Drawable):
 
         NaN of a cycle that is one of a family, unless its period or energy is fixed.
         """
-        from .error_bounds import period_error_of
-
-        if self._curve is None or self._unknowns is None:
+        if self._solved is None:
             return float("nan")
-        return period_error_of(self._curve, self._unknowns)
+        curve, u = self._solved
+        return curve.period_error(u)
 
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
         """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
