@@ -26,7 +26,7 @@ from .connection_curves import ConnectionWay
 from .conservative_families import FamilyCurve
 from .curves_born_at import fold_of_cycles_at, homoclinic_at
 from .flow_map import Floats
-from .locus_points import ENDS, LocusPoint, Segment, points_between, watched_functions
+from .locus_points import ENDS, LocusPlace, LocusPoint, LocusTrace, Segment, points_between, watched_functions
 from .pseudo_arclength import CorrectorFailed
 from .shooting_curve import PeriodicOrbitCurve
 from .solution_surface import SolutionSurface, SurfacePoint
@@ -187,11 +187,36 @@ def locus(
         point = fold_of_cycles_at(point, limits) if bautin else homoclinic_at(point, limits)
     if parameter is None:
         raise ModelError("say which second parameter is varied")
+    if isinstance(point, BifurcationPoint | Connection) and parameter == point.parameter:
+        raise ModelError(f"the second parameter must be another than {parameter}")
+    box = np.array([bounds_of(within), bounds_of(bounds)])
+    ds = number("ds", ds, above=0.0)
+    steps = ds, max(ds, number("ds_max", ds_max, above=0.0)), whole("max_points", max_points, 1)
     if isinstance(point, Connection):
-        box = np.array([bounds_of(within), bounds_of(bounds)])
-        ds = number("ds", ds, above=0.0)
-        ds_max = max(ds, number("ds_max", ds_max, above=0.0))
-        return _of_connections(point, parameter, box, ds, ds_max, whole("max_points", max_points, 1))
+        connections = ConnectionWay((point.parameter, parameter), box, *steps)
+        start = connections.entered(point)
+        back, on = (connections.follow(start, sense) for sense in (-1.0, 1.0))
+    else:
+        back, on = _followed(point, parameter, box, *steps)
+    places = [*back.places[:0:-1], *on.places]
+    solutions = tuple(place.solution for place in places)
+    coefficients = [s.lyapunov_coefficient if isinstance(s, Equilibrium) else np.nan for s in solutions]
+    return Locus(
+        point.kind,
+        (point.parameter, parameter),
+        np.array([place.values for place in places]),
+        solutions,
+        np.array([place.frequency for place in places]),
+        np.array(coefficients),
+        (back.end, on.end or back.end),
+        (*back.points[::-1], *on.points),
+    )
+
+
+def _followed(
+    point: BifurcationPoint, parameter: str, box: Floats, step: float, longest: float, most: int
+) -> tuple[LocusTrace, LocusTrace]:
+    """Follow a bifurcation point over a second parameter in both directions."""
     if not isinstance(point, BifurcationPoint) or point._curve is None or point._place is None:
         raise ModelError("a bifurcation point of udd.continuation is needed")
     if point.kind not in FUNCTIONS or point.kind == "branch point":
@@ -199,85 +224,28 @@ def locus(
     if isinstance(point._curve, FamilyCurve):
         raise ModelError("points of a family of cycles are not followed over a second parameter")
     second = point._curve.flow.index(parameter)
-    if second == point._curve.parameter:
-        raise ModelError(f"the second parameter must be another than {parameter}")
-    box = np.array([bounds_of(within), bounds_of(bounds)])
     start = np.array([point.value, point._curve.values_at(point._place.u)[second]])
     if (start < box[:, 0]).any() or (start > box[:, 1]).any():
         raise ModelError(f"the point itself, at {start[0]:g} and {start[1]:g}, lies outside the bounds")
-    ds = number("ds", ds, above=0.0)
-    ds_max = max(ds, number("ds_max", ds_max, above=0.0))
-    max_points = whole("max_points", max_points, 1)
     scaled = in_unit_of(point, *box[0])
     assert scaled._curve is not None and scaled._place is not None
     surface = SolutionSurface(scaled._curve, second, unit_of(start[1], *box[1]))
-    way = _Way(surface, point.kind, box, ds, ds_max, max_points)
+    way = _Way(surface, point.kind, box, step, longest, most)
     try:
         begin = surface.start(scaled._place)
         back = way.follow(begin, -1.0)
-        on = _Trace([_note(surface, point.kind, begin)], []) if back.end == CLOSED else way.follow(begin, 1.0)
+        if back.end == CLOSED:
+            return back, LocusTrace([_place(surface, point.kind, begin)])
+        return back, way.follow(begin, 1.0)
     except (CorrectorFailed, IntegrationError) as error:
         raise ModelError(f"the point cannot be followed: {error}") from None
-    found = [*back.notes[:0:-1], *on.notes]
-    solutions = tuple(note.solution for note in found)
-    coefficients = [s.lyapunov_coefficient if isinstance(s, Equilibrium) else np.nan for s in solutions]
-    return Locus(
-        point.kind,
-        (point.parameter, parameter),
-        np.array([note.values for note in found]),
-        solutions,
-        np.array([note.frequency for note in found]),
-        np.array(coefficients),
-        (back.end, on.end or back.end),
-        (*back.points[::-1], *on.points),
-    )
 
 
-def _of_connections(
-    start: Connection, parameter: str, box: Floats, ds: float, ds_max: float, most: int
-) -> Locus:
-    """The curve of connections over two parameters."""
-    if parameter == start.parameter:
-        raise ModelError(f"the second parameter must be another than {parameter}")
-    way = ConnectionWay((start.parameter, parameter), box, ds, ds_max, most)
-    start = way.entered(start)
-    (back, first), (on, last) = (way.follow(start, sense) for sense in (-1.0, 1.0))
-    found = [*back[:0:-1], *on]
-    nothing = np.full(len(found), np.nan)
-    return Locus(
-        start.kind,
-        way.parameters,
-        np.array([values for values, _ in found]),
-        tuple(one for _, one in found),
-        nothing,
-        nothing,
-        (first, last),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Note:
-    """One point of a locus: parameters, solution and frequency."""
-
-    values: Floats
-    solution: Equilibrium | PeriodicOrbit
-    frequency: float
-
-
-@dataclass
-class _Trace:
-    """Points of a locus in one direction, and why it ends."""
-
-    notes: list[_Note]
-    points: list[LocusPoint]
-    end: str = ""
-
-
-def _note(surface: SolutionSurface, kind: str, point: SurfacePoint) -> _Note:
+def _place(surface: SolutionSurface, kind: str, point: SurfacePoint) -> LocusPlace:
     u, frequency = point.v[:-1], float("nan")
     if FUNCTIONS[kind] == "complex_pair":
         frequency = point.curve.frequency(u, point.functions)
-    return _Note(surface.values(point), point.curve.solution(u), frequency)
+    return LocusPlace(surface.values(point), point.curve.solution(u), frequency)
 
 
 def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> list[LocusPoint]:
@@ -305,15 +273,15 @@ class _Way:
     longest: float
     most: int
 
-    def follow(self, start: SurfacePoint, sense: float) -> _Trace:
+    def follow(self, start: SurfacePoint, sense: float) -> LocusTrace:
         """Points from the start on; `sense` is that of the second parameter at first."""
         surface, name = self.surface, FUNCTIONS[self.kind]
         here, step, along = start, self.step, np.zeros_like(start.v)
         along[-1] = sense
-        trace = _Trace([_note(surface, self.kind, start)], [])
+        trace = LocusTrace([_place(surface, self.kind, start)])
         first = np.zeros_like(start.v)
         watched: dict[str, float] | None = None
-        while len(trace.notes) <= self.most:
+        while len(trace.places) <= self.most:
             try:
                 surface, here = surface.anchored(here)
                 slope = surface.slope(here, name)
@@ -354,22 +322,22 @@ class _Way:
                     continue
                 trace.points.append(point)
                 if point.kind in ENDS.get(self.kind, ()):
-                    trace.notes.append(_Note(point.values, point.solution, 0.0))
+                    trace.places.append(LocusPlace(point.values, point.solution, 0.0))
                     trace.end = f"a {point.kind} point"
                     return trace
             if outside:
                 trace.end = f"the bound {outside[0][1] if last is None else last[1]:.6g}"
                 if last is not None:
-                    trace.notes.append(_note(surface, self.kind, last[2]))
+                    trace.places.append(_place(surface, self.kind, last[2]))
                 return trace
             passed = (here.v - start.v) @ first < 0.0 <= (there.v - start.v) @ first
             near = np.linalg.norm(there.v - start.v) < 1.5 * np.linalg.norm(there.v - here.v)
-            if len(trace.notes) > _LOOP and passed and near:
-                trace.notes.append(_note(surface, self.kind, there))
+            if len(trace.places) > _LOOP and passed and near:
+                trace.places.append(_place(surface, self.kind, there))
                 trace.end = CLOSED
                 return trace
             here, along, watched = there, there.v - here.v, after
-            trace.notes.append(_note(surface, self.kind, here))
+            trace.places.append(_place(surface, self.kind, here))
             step = min(self.longest, 1.4 * step)
         trace.end = "as many points as were wanted"
         return trace

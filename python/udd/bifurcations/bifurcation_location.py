@@ -9,7 +9,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy import optimize
 
-from .bifurcation_functions import STILL, TestFunctions
+from udd.errors import IntegrationError
+
+from .bifurcation_functions import FUNCTIONS, STILL, TestFunctions
 from .branch import AnyCurve, BifurcationPoint
 from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import COARSE, rounding_of, scatter
@@ -21,16 +23,18 @@ from .pseudo_arclength import (
     corrected_point,
     nearest_of_family,
     newton_corrector,
+    predictor_corrector_step,
     tangent_at,
 )
 from .shooting_curve import PeriodicOrbitCurve
-from .solutions import Equilibrium, PeriodicOrbit
+from .solutions import Equilibrium
 
 __all__ = [
     "bifurcations_between",
     "changes",
     "locate",
     "location_error",
+    "nearest_bifurcation",
     "pitchfork_at",
     "point_at",
 ]
@@ -40,6 +44,7 @@ _ENOUGH = 8  # of which so many at least
 _SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
 _NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
 _SHORT = 200  # pieces of a cycle up to which rounding is asked for
+_STEPS = 24  # along a curve, in either direction, until a bifurcation is met
 _SURE = 2.0  # and how far beyond the largest scatter the error may lie
 
 
@@ -266,12 +271,12 @@ def point_at(
     kind: str,
     place: CurvePoint,
     signs: TestFunctions,
-    solution: Equilibrium | PeriodicOrbit,
-    arclength: float,
-    errors: tuple[float, float],
+    arclength: float = 0.0,
+    errors: tuple[float, float] = (float("nan"), float("nan")),
 ) -> BifurcationPoint:
-    """The point with what belongs to its kind."""
+    """Return the bifurcation point at a place, with the frequency and coefficient that belong to its kind."""
     frequency = coefficient = float("nan")
+    solution = curve.solution(place.u)
     if kind in ("Hopf", "Neimark-Sacker"):
         frequency = curve.frequency(place.u, signs)
     if kind == "Hopf" and isinstance(solution, Equilibrium):
@@ -280,3 +285,28 @@ def point_at(
     return BifurcationPoint(
         kind, curve.name, value, *errors, solution, arclength, frequency, coefficient, curve, place
     )
+
+
+def nearest_bifurcation(
+    curve: AnyCurve, guess: Floats, row: Floats, kind: str, step: float
+) -> BifurcationPoint | None:
+    """Return the bifurcation of a kind that is nearest to a guess, along its curve in both directions."""
+    points: list[BifurcationPoint] = []
+    for sense in (1.0, -1.0):
+        with suppress(CorrectorFailed, IntegrationError):
+            begin = corrected_point(curve, guess, row, patience=20)
+            here, size = CurvePoint(begin.u, sense * begin.tangent), step
+            signs = curve.test_functions(here)
+            for _ in range(_STEPS):
+                there, gone, size = predictor_corrector_step(curve, here, size, step)
+                after = curve.test_functions(there)
+                passed = bifurcations_between(curve, here, gone, signs, after)
+                found = next((entry for entry in passed if entry[0] == kind), None)
+                if found is not None:
+                    _, sigma, place, at = found
+                    errors = location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
+                    points.append(point_at(curve, kind, place, at, errors=errors))
+                    break
+                here, signs = there, after
+    begins = curve.value(guess)
+    return min(points, key=lambda point: abs(point.value - begins), default=None)

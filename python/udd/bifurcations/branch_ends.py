@@ -6,25 +6,16 @@ import numpy as np
 
 from udd.errors import IntegrationError
 
-from .bifurcation_functions import FUNCTIONS
-from .bifurcation_location import bifurcations_between, location_error, point_at
+from .bifurcation_location import nearest_bifurcation
 from .branch import AnyCurve, BifurcationPoint
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
 from .periodic_orbits import half_of
-from .pseudo_arclength import (
-    CorrectorFailed,
-    CurvePoint,
-    natural_constraint,
-    newton_corrector,
-    predictor_corrector_step,
-    tangent_at,
-)
+from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["closes", "hopf_end", "origin_of", "size_of", "vanishing_part"]
 
-_STEPS = 24  # along the other branch, in either direction, until the bifurcation is met
 _RATIO = 1.3  # of the cycle's period to that of the Hopf bifurcation at most
 _FARTHEST = 3.0  # sizes of the cycle between its centre and the equilibrium
 _COLLAPSED = 0.02  # of its size before, below which an orbit is an equilibrium
@@ -65,7 +56,9 @@ def hopf_end(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
     flow, size, period = curve.flow, size_of(curve, u), curve.period(u)
     rest = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
     centre = _orbit(curve, u).mean(axis=0)
-    point = _nearest(rest, rest.pack(centre, curve.value(u)), "Hopf", max(0.3 * size, _SHORTEST))
+    guess = rest.pack(centre, curve.value(u))
+    step = max(0.3 * size, _SHORTEST)
+    point = nearest_bifurcation(rest, guess, natural_constraint(guess), "Hopf", step)
     if point is None or not 1.0 / _RATIO < period / point.period < _RATIO:
         return None
     away = np.linalg.norm((flow.reduced(point.solution.state) - centre) / flow.size)
@@ -80,32 +73,8 @@ def origin_of(curve: PeriodicOrbitCurve, u: Floats, step: float) -> BifurcationP
         return None
     if not kind:
         return None
-    return _nearest(half, half.pack(nodes, 0.5 * curve.span(u), curve.value(u)), kind, 0.5 * step)
-
-
-def _nearest(curve: AnyCurve, guess: Floats, kind: str, step: float) -> BifurcationPoint | None:
-    """The bifurcation of a kind on the curve through a guess, the nearer one of both directions."""
-    found: list[BifurcationPoint] = []
-    for sense in (1.0, -1.0):
-        try:
-            u = newton_corrector(curve, guess, natural_constraint(guess), patience=20)
-            here, size = CurvePoint(u, sense * tangent_at(curve, u, natural_constraint(u))), step
-            signs = curve.test_functions(here)
-            for _ in range(_STEPS):
-                there, gone, size = predictor_corrector_step(curve, here, size, step)
-                after = curve.test_functions(there)
-                met = [one for one in bifurcations_between(curve, here, gone, signs, after) if one[0] == kind]
-                if met:
-                    _, sigma, place, at = met[0]
-                    errors = location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
-                    solution = curve.solution(place.u)
-                    found.append(point_at(curve, kind, place, at, solution, 0.0, errors))
-                    break
-                here, signs = there, after
-        except (CorrectorFailed, IntegrationError):
-            continue
-    begin = float(guess[-1]) * curve.scale
-    return min(found, key=lambda point: abs(point.value - begin), default=None)
+    guess = half.pack(nodes, 0.5 * curve.span(u), curve.value(u))
+    return nearest_bifurcation(half, guess, natural_constraint(guess), kind, 0.5 * step)
 
 
 def closes(

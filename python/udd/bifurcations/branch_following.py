@@ -215,7 +215,7 @@ class _Way(BranchTrace):
     def note(self, there: Station, kind: str, errors: tuple[float, float]) -> None:
         """Note a bifurcation point; the way ends with the last one that is wanted."""
         curve, place, signs, arclength = there
-        point = point_at(curve, kind, place, signs, curve.solution(place.u), arclength, errors)
+        point = point_at(curve, kind, place, signs, arclength, errors)
         self.points.append(point)
         self.places.append(there)
         if self.limits.until(point):

@@ -12,6 +12,7 @@ from .boundary_value import ConnectingCurve
 from .branch_continuation import unit_of
 from .connecting_orbits import Connection, found_by
 from .flow_map import Floats
+from .locus_points import LocusPlace, LocusTrace
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
@@ -65,13 +66,14 @@ class ConnectionWay:
         bound = low if value < low else high
         box = np.array([self.box[0], sorted((value, bound))])
         way = replace(self, box=box)
-        found, end = way.follow(start, float(np.sign(bound - value)))
-        if end != f"the bound {bound:.6g}":
-            raise ModelError(f"the curve does not lead into the bounds of {self.parameters[1]}: {end}")
-        return found[-1][1]
+        trace = way.follow(start, float(np.sign(bound - value)))
+        last = trace.places[-1].solution
+        if trace.end != f"the bound {bound:.6g}" or not isinstance(last, Connection):
+            raise ModelError(f"the curve does not lead into the bounds of {self.parameters[1]}: {trace.end}")
+        return last
 
-    def follow(self, start: Connection, sense: float) -> tuple[list[tuple[Floats, Connection]], str]:
-        """Return both parameters and the connections from one inside the bounds on, and why it ends."""
+    def follow(self, start: Connection, sense: float) -> LocusTrace:
+        """Return the connections from one inside the bounds on."""
         assert start._orbit is not None
         curve, u = start._orbit
         first, second = (curve.flow.index(name) for name in self.parameters)
@@ -80,33 +82,44 @@ class ConnectionWay:
         scales = np.array([unit_of(v, *b) for v, b in zip(p.tolist(), self.box.tolist(), strict=True)])
         weight = _SHAPE / float(np.sqrt(len(curve.nodes(u))))
         curve, u = curve.over((first, second), u, scales, weight)
-        found, step, along = [(p, start)], self.step, np.append(np.zeros(len(u) - 1), sense)
-        while len(found) <= self.most:
+        trace, step, along = (
+            LocusTrace([LocusPlace(p, start)]),
+            self.step,
+            np.append(np.zeros(len(u) - 1), sense),
+        )
+        while len(trace.places) <= self.most and not trace.end:
             try:
                 curve, here = _cut(curve, u, along)
                 there, _, step = predictor_corrector_step(curve, here, step, self.longest, _SHORTEST)
                 met = self._bound(curve, here, there)
                 if met is not None and met[0] < _ON:
-                    return found, f"the bound {met[1]:.6g}"
+                    trace.end = f"the bound {met[1]:.6g}"
+                    break
                 trial = self._connection(curve, there.u if met is None else met[3])
             except (CorrectorFailed, ModelError, IntegrationError, np.linalg.LinAlgError) as error:
-                return found, f"lost: {error}"
+                trace.end = f"lost: {error}"
+                break
             assert trial._orbit is not None
             curve, u = trial._orbit[0].over((first, second), trial._orbit[1], scales, weight)
             along = there.tangent
-            found.append((curve.parameters(u), trial))
+            values, before = curve.parameters(u), trace.places[-1]
             if met is not None:
-                found[-1][0][met[2]] = met[1]
-                return found, f"the bound {met[1]:.6g}"
-            if trial.nearest > _FLAT and len(found) > 2:
-                return found, self._fold_ahead(*found[-2:])
-        return found, "as many points as were wanted"
+                values[met[2]] = met[1]
+                trace.end = f"the bound {met[1]:.6g}"
+            trace.places.append(LocusPlace(values, trial))
+            if met is None and trial.nearest > _FLAT and len(trace.places) > 2:
+                trace.end = self._fold_ahead(before, trace.places[-1])
+        trace.end = trace.end or "as many points as were wanted"
+        return trace
 
-    def _fold_ahead(self, before: tuple[Floats, Connection], last: tuple[Floats, Connection]) -> str:
+    def _fold_ahead(self, before: LocusPlace, last: LocusPlace) -> str:
         """Return where the slowest eigenvalue vanishes, extrapolated: the orbit's equilibrium folds there."""
-        slow = [float(np.abs(one.equilibrium.eigenvalues.real).min()) for _, one in (before, last)]
+        rests = [
+            place.solution.equilibrium for place in (before, last) if isinstance(place.solution, Connection)
+        ]
+        slow = [float(np.abs(rest.eigenvalues.real).min()) for rest in rests]
         part = slow[1] / (slow[0] - slow[1]) if slow[0] > slow[1] else 0.0
-        p, q = last[0] + part * (last[0] - before[0])
+        p, q = last.values + part * (last.values - before.values)
         return (
             f"a saddle-node of equilibria near {self.parameters[0]} = {p:.5g}, {self.parameters[1]} = {q:.5g}"
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -162,37 +162,25 @@ class FamilyCurve(PeriodicOrbitCurve):
         if kept > 1:
             raise ModelError(f"{kept} quantities are kept, or the cycles near by all have the same period")
 
-    def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
-        """Scaled gaps between the pieces and the phase, and their derivatives."""
-        residual, matrix = super().equations(u)
+    def cyclic_equations(self, u: Floats) -> tuple[Floats, CyclicEquations]:
+        """Return the scaled gaps, the last one with its free direction, and the phase, and derivatives."""
+        residual, matrix = super().cyclic_equations(u)
         m, r = self.pieces, self.flow.dim
         free = self.slope(u) if self.free is None else self.free
-        rows = slice((m - 1) * r, m * r)
-        both = (
-            matrix.both.copy()
-            if isinstance(matrix, CyclicEquations)
-            else matrix[: m * r, -2:].reshape(m, r, 2)
-        )
-        both = np.array(both)
+        last, both, pieces = slice((m - 1) * r, m * r), matrix.both.copy(), matrix.pieces
         if self.conserved is None:
-            residual[rows] += free * u[-2]
+            residual[last] += free * u[-2]
             both[:, :, 1] = both[:, :, 0]
             both[:, :, 0] = 0.0
             both[-1, :, 0] = free
-            inside = np.zeros((r, r))
         else:
             # At the start of the last piece, whose gap then depends on no other node.
             at, slope = self.conserved.at(self.flow, self.nodes(u)[-1])
-            residual[rows] += free * (at - self.value(u)) / self.scale
+            residual[last] += free * (at - self.value(u)) / self.scale
             both[-1, :, 1] = -free
-            inside = np.outer(free, slope * self.flow.size * np.sqrt(m) / self.scale)
-        if isinstance(matrix, CyclicEquations):
-            pieces = matrix.pieces.copy()
-            pieces[-1] += inside
-            return residual, CyclicEquations(pieces, matrix.after, both, matrix.phase, matrix.last)
-        matrix[rows, rows] += inside
-        matrix[: m * r, -2:] = both.reshape(m * r, 2)
-        return residual, matrix
+            pieces = pieces.copy()
+            pieces[-1] += np.outer(free, slope * self.flow.size * np.sqrt(m) / self.scale)
+        return residual, replace(matrix, pieces=pieces, both=both)
 
     def _decided_functions(self, place: CurvePoint, found: Multipliers) -> TestFunctions:
         """Return the functions where one multiplier is 1 and the others are pairs with the product 1.

@@ -89,9 +89,8 @@ def _hopf_points(point: LocusPoint) -> list[BifurcationPoint]:
 
 def _as_hopf(surface: SolutionSurface, there: SurfacePoint) -> list[BifurcationPoint]:
     """The point as one of its branch over the first parameter; none if no pair is complex there."""
-    signs, u = there.functions, there.v[:-1]
+    signs = there.functions
     pair = signs.pair
     if abs(pair.imag) * there.curve.flow.clock < 1e-4 or abs(pair.real) > 1e-6 * abs(pair.imag):
         return []
-    solution, nothing = there.curve.solution(u), (float("nan"), float("nan"))
-    return [point_at(there.curve, "Hopf", there.place, signs, solution, 0.0, nothing)]
+    return [point_at(there.curve, "Hopf", there.place, signs)]

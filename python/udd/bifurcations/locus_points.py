@@ -10,6 +10,7 @@ from scipy import optimize
 
 from udd.errors import IntegrationError
 
+from .connecting_orbits import Connection
 from .equilibrium_curve import EquilibriumCurve, expansion
 from .error_bounds import COARSE, rounding_of, scatter
 from .flow_map import Floats
@@ -26,7 +27,7 @@ from .shooting_curve import PeriodicOrbitCurve
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["ENDS", "LocusPoint", "Segment", "points_between", "watched_functions"]
+__all__ = ["ENDS", "LocusPlace", "LocusPoint", "LocusTrace", "Segment", "points_between", "watched_functions"]
 
 _NEAR = 1e-4  # radians in a typical time, or from 1: a pair that is so near to being real is real
 _ZERO = 1e-3  # of its values before and after, below which a function is zero where it changes its sign
@@ -72,6 +73,24 @@ class LocusPoint:
         where = ", ".join(f"{name} = {value:.12g} (error below {error:.1g})" for name, value, error in pairs)
         numbers = "".join(f", {name} = {value:.6g}" for name, value in self.coefficients.items())
         return f"<{self.kind} at {where}{numbers}>"
+
+
+@dataclass(frozen=True, eq=False)
+class LocusPlace:
+    """A place on a curve over two parameters: their values, the solution there, and the frequency."""
+
+    values: Floats
+    solution: Equilibrium | PeriodicOrbit | Connection
+    frequency: float = float("nan")
+
+
+@dataclass
+class LocusTrace:
+    """One direction of a curve over two parameters: places, special points, and why it ends."""
+
+    places: list[LocusPlace]
+    points: list[LocusPoint] = field(default_factory=list)
+    end: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,7 +97,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     errors = location_error(
         new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
     )
-    own = point_at(new, _KIND, place, signs, new.solution(place.u), size, errors)
+    own = point_at(new, _KIND, place, signs, size, errors)
     # Orbits beyond the doubling, from the secant method, are left out.
     places = [Station(new, *found[s], s**0.5) for s in sorted(found) if s <= square]
     way = BranchTrace(places, [own], "the point that was wanted")

@@ -7,11 +7,11 @@ from scipy import optimize
 
 from udd.errors import IntegrationError
 
-from .bifurcation_location import bifurcations_between, location_error, point_at
+from .bifurcation_location import nearest_bifurcation
 from .branch import BifurcationPoint, Branch
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, corrected_point
+from .pseudo_arclength import CorrectorFailed
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["saddle_node_on"]
@@ -63,13 +63,6 @@ def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
         if not found.success or np.linalg.norm(rests.state(guess) / flow.size - slow / flow.size) > _NEAR:
             return None
         along = np.linalg.svd(rests.equations(guess)[1])[2][-1]
-        here = corrected_point(rests, guess - _BESIDE * along, along)
-        there = corrected_point(rests, here.u + 2.0 * _BESIDE * here.tangent, here.tangent)
-        signs, step = (rests.test_functions(here), rests.test_functions(there)), 2.0 * _BESIDE
-        for kind, sigma, place, at in bifurcations_between(rests, here, step, *signs):
-            if kind == "fold":
-                errors = location_error(rests, here, sigma, place, step, "fold")
-                return point_at(rests, kind, place, at, rests.solution(place.u), 0.0, errors)
+        return nearest_bifurcation(rests, guess - _BESIDE * along, along, "fold", 2.0 * _BESIDE)
     except (CorrectorFailed, IntegrationError, ValueError, np.linalg.LinAlgError):
         return None
-    return None

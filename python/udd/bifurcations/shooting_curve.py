@@ -21,7 +21,7 @@ from .solutions import PeriodicOrbit
 
 __all__ = ["PeriodicOrbitCurve"]
 
-_DENSE = 60  # unknowns up to which a dense matrix is as fast
+_DENSE = 61  # equations up to which a dense matrix is as fast
 _EXACT = 1e-11  # a singular value below this part of the largest is zero but for rounding
 
 
@@ -134,7 +134,12 @@ class PeriodicOrbitCurve(SolutionCurve):
         return self._last[key]
 
     def equations(self, u: Floats) -> tuple[Floats, Floats | CyclicEquations]:
-        """Scaled gaps between the pieces and the phase, and their derivatives."""
+        """Return the scaled gaps between the pieces and the phase, and their derivatives."""
+        residual, matrix = self.cyclic_equations(u)
+        return residual, matrix.toarray() if len(residual) <= _DENSE else matrix
+
+    def cyclic_equations(self, u: Floats) -> tuple[Floats, CyclicEquations]:
+        """Return the same with the derivatives piece by piece."""
         m, r, size = self.pieces, self.flow.dim, self.flow.size
         weight = 1.0 / np.sqrt(m)
         nodes, found = self.nodes(u), self.flight(u)
@@ -160,16 +165,6 @@ class PeriodicOrbitCurve(SolutionCurve):
             by_own = 0.0 if self.parameter == HELD else float(by_values[self.parameter])
             last = np.array([1.0, -self.share * by_own * self.scale / self.clock])
         residual = np.append(gaps.ravel(), phase)
-        n = m * r
-        if n <= _DENSE:
-            dense = np.zeros((n + 1, n + 2))
-            for i in range(m):
-                rows, after = slice(i * r, i * r + r), ((i + 1) % m) * r
-                dense[rows, rows] += by_state[i]
-                dense[rows, after : after + r] -= np.eye(r) / weight
-            dense[:n, n], dense[:n, n + 1] = by_span.ravel(), by_value.ravel()
-            dense[n, :n], dense[n, n:] = along.ravel(), last
-            return residual, dense
         both = np.stack([by_span, by_value], axis=2)
         return residual, CyclicEquations(by_state, 1.0 / weight, both, along, last)
 
