@@ -17,11 +17,11 @@ KEPT = {
     "Section.found",
     "TrackOptions.apart",
     "TrackedFrame.held",
+    "equilibria.near",
+    "lifetimes.near",
     "page.found",
     "track.more",
 }
-#: The package whose names are not renamed yet.
-PENDING = {"bifurcations"}
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef
 Node = ast.AST
 
@@ -89,7 +89,6 @@ def test_no_pronoun_lives_longer_than_five_lines() -> None:
     faults = [
         f"{path.relative_to(PACKAGE)}:{fault}"
         for path in sorted(PACKAGE.rglob("*.py"))
-        if path.relative_to(PACKAGE).parts[0] not in PENDING
         for fault in untelling(path.read_text(encoding="utf-8"))
     ]
     assert faults == []

@@ -92,14 +92,14 @@ class Locus(Drawable):
         states, special = np.array([rest.state for rest in rests]), np.zeros((0, 2))
         if self.points:
             special = np.array([point.values for point in self.points])
-        found = of_states(model.state_names, model.state_units, states, ["place"], {}, kind=self.kind)
+        table = of_states(model.state_names, model.state_units, states, ["place"], {}, kind=self.kind)
         columns = {name: ("place", self.values[:, k]) for k, name in enumerate(self.parameters)}
         columns |= {f"special_{name}": ("special", special[:, k]) for k, name in enumerate(self.parameters)}
         columns |= {
             "frequency": ("place", self.frequencies),
             "lyapunov_coefficient": ("place", self.lyapunov_coefficients),
         }
-        return found.assign_coords(special=[point.kind for point in self.points]).assign(columns)
+        return table.assign_coords(special=[point.kind for point in self.points]).assign(columns)
 
     def __repr__(self) -> str:
         (a, b), (p, q) = self.values[[0, -1]], self.parameters

@@ -66,7 +66,7 @@ def bifurcations_between(
     `a` is followed by a point at the distance `step`, where the functions are `after`.
     """
     changed = changes(before, after)
-    found = []
+    passed = []
     for name in changed:
         if name == "unit_multiplier" and "fold" in changed:
             continue
@@ -81,7 +81,7 @@ def bifurcations_between(
         try:
             if name == "fold" and "unit_multiplier" not in changed:
                 sigma, place = turning(curve, a, step, before, after)
-                found.append(("end", sigma, place, curve.test_functions(place)))
+                passed.append(("end", sigma, place, curve.test_functions(place)))
                 continue
             sigma, place = locate(curve, a, step, name)
         except (CorrectorFailed, ValueError):
@@ -91,8 +91,8 @@ def bifurcations_between(
             continue
         kind = curve.kind_at(name, here)
         if kind:
-            found.append((kind, sigma, place, here))
-    return sorted(found, key=lambda one: one[1])
+            passed.append((kind, sigma, place, here))
+    return sorted(passed, key=lambda one: one[1])
 
 
 def turning(
@@ -230,18 +230,18 @@ def location_error(
         pair = np.array([own.value(there.u), own.period(there.u)])
         return float(getattr(own.test_functions(there), name)), pair
 
-    known = np.array([curve.value(place.u), curve.period(place.u)])
+    located = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
     (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
     moved, there = at(sigma, replace(curve, loose=COARSE))
     here, _ = at(sigma)
     shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
-    value, period = rounding_of(known) + np.abs(there - known) + np.abs(shift)
+    value, period = rounding_of(located) + np.abs(there - located) + np.abs(shift)
     if curve.pieces <= _SHORT:
         # Rounding is that of the largest numbers in the equations, which the value itself may not be.
         near = np.array([-1.0, -0.5, 0.5, 1.0])
         noise, fitted = scatter(near, np.array([at(sigma + _NEAR * step * x)[1] for x in near]), 2)
-        noise = noise + np.abs(fitted[2] - known)
+        noise = noise + np.abs(fitted[2] - located)
         value, period = value + _SURE * noise[0], period + _SURE * noise[1]
     return float(value), float(period)
 
@@ -250,15 +250,15 @@ def _scatter(
     curve: EquilibriumCurve, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
 ) -> tuple[float, float]:
     """Bounds of the errors of the value and of the period: from how those near by scatter about a curve."""
-    near = np.linspace(-1.0, 1.0, _SAMPLES)
+    distances = np.linspace(-1.0, 1.0, _SAMPLES)
     seen = []
-    for distance in sigma + _NEAR * step * near:
+    for distance in sigma + _NEAR * step * distances:
         there = corrected_point(curve, a.u + distance * a.tangent, a.tangent)
         signs = curve.test_functions(there)
         turning = abs(signs.pair.imag)
         period = 2.0 * np.pi / turning if name == "complex_pair" and turning else np.nan
         seen.append((float(getattr(signs, name)), curve.value(there.u), period))
-    noise, fitted = scatter(near, np.array(seen), 2)
+    noise, fitted = scatter(distances, np.array(seen), 2)
     slope = np.abs(fitted[1])
     # So far along the branch the zero may be off.
     off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0

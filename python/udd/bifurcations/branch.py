@@ -100,12 +100,12 @@ class BifurcationPoint(Drawable):
         return "supercritical" if self.lyapunov_coefficient < 0 else "subcritical"
 
     def __repr__(self) -> str:
-        more = f", {self.criticality} (first Lyapunov coefficient {self.lyapunov_coefficient:.6g})"
+        criticality = f", {self.criticality} (first Lyapunov coefficient {self.lyapunov_coefficient:.6g})"
         bound = f"error below {self.period_error:.1g}" if np.isfinite(self.period_error) else "no bound"
         period = f", period {self.period:.12g} ({bound})" if np.isfinite(self.period) else ""
         return (
             f"<{self.kind} at {self.parameter} = {self.value:.13g} (error below {self.error:.1g}){period}"
-            f"{more if self.criticality else ''}>"
+            f"{criticality if self.criticality else ''}>"
         )
 
 

@@ -220,13 +220,13 @@ def _at(
             raise ModelError("this cycle was not made by udd.periodic_orbit")
         old = solved[0]
         nodes, span = old.nodes(solved[1]), old.span(solved[1])
-        own = replace(old.flow, model=flow.model)
-        kept = Conserved.of(own, parameter) if family and parameter != PERIOD else None
+        free_flow = replace(old.flow, model=flow.model)
+        kept = Conserved.of(free_flow, parameter) if family and parameter != PERIOD else None
         if kept is not None:
-            value = kept.at(own, nodes[0])[0]
+            value = kept.at(free_flow, nodes[0])[0]
         scale = unit_of(value, low, high)
         where = old.mirror, old.shift, old.reference, old.across, old.share
-        common = own, flow.values, index, scale, span, old.pieces, *where
+        common = free_flow, flow.values, index, scale, span, old.pieces, *where
         curve = FamilyCurve(*common, conserved=kept) if family else PeriodicOrbitCurve(*common)
         u = curve.pack(nodes, span, value)
         if isinstance(curve, FamilyCurve):

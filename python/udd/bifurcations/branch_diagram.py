@@ -58,7 +58,7 @@ class Diagram(Drawable):
         """The bifurcation points of all branches, by the parameter; where two branches meet, one."""
         points: list[BifurcationPoint] = []
         for point in sorted((p for branch in self.branches for p in branch.points), key=lambda p: p.value):
-            if not any(_one(point, known) for known in points):
+            if not any(_same_point(point, known) for known in points):
                 points.append(point)
         return tuple(points)
 
@@ -171,8 +171,8 @@ def descendants(
     not found; the others are followed nevertheless.
     `options` are those of :func:`udd.continuation`.
     """
-    found = list(branches)
-    waiting = [(point, 1) for branch in found for point in branch.points]
+    family = list(branches)
+    waiting = [(point, 1) for branch in family for point in branch.points]
     while waiting:
         point, generation = waiting.pop(0)
         if point.kind not in _BORN or generation > generations:
@@ -184,17 +184,17 @@ def descendants(
             missed(point, error)
             continue
         middle, value = born.solution(len(born) // 2), float(born.values[len(born) // 2])
-        if not any(_has(branch, middle, value) for branch in found):
-            found.append(born)
+        if not any(_has(branch, middle, value) for branch in family):
+            family.append(born)
             waiting += [(p, generation + 1) for p in born.points]
-    return found
+    return family
 
 
 def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[PeriodicOrbit, float]]:
     """A cycle of each periodic attractor, from the middle of its stretch."""
     kinds = np.stack([scan[name].to_numpy() for name in ("attractor", "period", "symmetric")], axis=-1)
     periodic = (kinds[..., 0] > 0) & (kinds[..., 1] > 0)
-    found = []
+    seeds = []
     # An attractor keeps its label where it doubles or loses its symmetry.
     for kind in np.unique(kinds[periodic], axis=0):
         places = np.argwhere(periodic & (kinds == kind).all(axis=-1))
@@ -208,11 +208,11 @@ def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[Periodi
             orbit = periodic_orbit(model.with_parameters({parameter: value}), state, period=time)
         except ModelError:
             continue  # what settles too slowly to be a good guess
-        found.append((orbit, value))
-    return found
+        seeds.append((orbit, value))
+    return seeds
 
 
-def _one(a: BifurcationPoint, b: BifurcationPoint) -> bool:
+def _same_point(a: BifurcationPoint, b: BifurcationPoint) -> bool:
     """Whether two points are one, or mirror images of each other."""
     near = abs(a.value - b.value) <= np.nan_to_num(a.error) + np.nan_to_num(b.error) + rounding_of(a.value)
     return a.kind == b.kind and bool(near) and _same(a.solution, b.solution)

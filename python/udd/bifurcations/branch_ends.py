@@ -105,13 +105,13 @@ def _numbers(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
     return np.array([curve.span(u) / curve.clock, u[-1]])
 
 
-def _distance(one: PeriodicOrbitCurve, u: Floats, other: PeriodicOrbitCurve, v: Floats) -> float:
+def _distance(first: PeriodicOrbitCurve, u: Floats, second: PeriodicOrbitCurve, v: Floats) -> float:
     """The largest distance of one orbit's nodes from the polygon of the other orbit, in typical sizes."""
     from .orbit_geometry import orbit_states
 
-    flow = one.flow
-    around = flow.reduced(orbit_states(other, v))
-    nodes = _orbit(one, u)
+    flow = first.flow
+    around = flow.reduced(orbit_states(second, v))
+    nodes = _orbit(first, u)
     gaps = nodes[:, None] - around[None]
     gaps = (gaps + flow.turns(gaps)) / flow.size
     sides = np.roll(around, -1, axis=0) - around

@@ -168,16 +168,16 @@ class _Way(BranchTrace):
         if point is None:
             return False
         with suppress(CorrectorFailed, IntegrationError):
-            near = _BEFORE * distance
+            gone = _BEFORE * distance
             tangent = here.place.tangent
-            last = corrected_point(curve, here.place.u + near * tangent, tangent)
-            if near > 0.0 and vanishing_part(curve, here.place.u, last.u) is None:
+            last = corrected_point(curve, here.place.u + gone * tangent, tangent)
+            if gone > 0.0 and vanishing_part(curve, here.place.u, last.u) is None:
                 after = curve.test_functions(last)
-                self.locate(here, near, after)
+                self.locate(here, gone, after)
                 if self.end:
                     return True
                 if limits.low <= curve.value(last.u) <= limits.high:
-                    self.places.append(Station(curve, last, after, here.arclength + near))
+                    self.places.append(Station(curve, last, after, here.arclength + gone))
         if not limits.low <= point.value <= limits.high:
             return False
         self.points.append(replace(point, arclength=here.arclength + distance))

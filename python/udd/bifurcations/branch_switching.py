@@ -59,18 +59,18 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
 
     # Nearer and nearer to the point: the branch may bend away from its first direction.
     for size in (amplitude * np.array([1.0, 0.3, 0.1, 3.0, 0.03])).tolist():
-        found = at(size)
-        if found is None:
+        begin = at(size)
+        if begin is None:
             continue
         for _ in range(_HALVINGS):
             nearer = at(0.5 * size)
-            if nearer is None or _nothing_between(new, point, begins, nearer, found):
+            if nearer is None or _nothing_between(new, point, begins, nearer, begin):
                 break
-            found, size = nearer, 0.5 * size
+            begin, size = nearer, 0.5 * size
         if isinstance(new, PeriodicOrbitCurve):
-            new = new.anchored(found.u)
-            found = CurvePoint(found.u, tangent_at(new, found.u, row))
-        return new, found, size
+            new = new.anchored(begin.u)
+            begin = CurvePoint(begin.u, tangent_at(new, begin.u, row))
+        return new, begin, size
     where = f"the {point.kind} at {point.parameter} = {point.value:.10g}"
     raise ModelError(
         f"the branch born at {where} is not found at amplitudes of {0.03 * amplitude:.2g} to "
@@ -112,12 +112,12 @@ def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbit
     for matrix in curve.flight(u).by_state[:-1]:
         moves.append(matrix @ moves[-1])
     first = np.array(moves)
-    both = np.vstack([nodes, curve.mirror * (nodes - curve.shift)])
+    rounds = np.vstack([nodes, curve.mirror * (nodes - curve.shift)])
     away = np.vstack([first, -curve.mirror * first])
     plain = np.ones(curve.flow.dim)
     shift = curve.shift + curve.mirror * curve.shift
     new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
-    base = new.pack(both, 2.0 * curve.span(u), curve.value(u))
+    base = new.pack(rounds, 2.0 * curve.span(u), curve.value(u))
     new = new.anchored(base)
     if isinstance(new, FamilyCurve) and isinstance(curve, FamilyCurve):
         # Two rounds have the multiplier 1 twice here: one round separates conservation from bifurcation.

@@ -16,13 +16,14 @@ class CyclicEquations:
     """Derivatives of the gaps between the pieces of a closed orbit, and of its phase.
 
     The unknowns are m nodes of r components each and two numbers. Piece i brings the rows
-    ``pieces[i] x[i] - after x[i + 1] + both[i] (p, q)``, where node m is node 0, and there is one more row.
+    ``pieces[i] x[i] - after x[i + 1] + by_pair[i] (p, q)``, where node m is
+    node 0, and there is one more row.
 
     Attributes
     ----------
     pieces : ndarray, shape (m, r, r)
     after : float
-    both : ndarray, shape (m, r, 2)
+    by_pair : ndarray, shape (m, r, 2)
     phase : ndarray, shape (m, r)
         The last row: of the nodes' components,
     last : ndarray, shape (2,)
@@ -31,7 +32,7 @@ class CyclicEquations:
 
     pieces: Floats
     after: float
-    both: Floats
+    by_pair: Floats
     phase: Floats
     last: Floats
 
@@ -44,7 +45,7 @@ class CyclicEquations:
         dense[each, :, (each + 1) % m] -= self.after * np.eye(r)
         matrix = np.zeros((m * r + 1, m * r + 2))
         matrix[:-1, :-2] = dense.reshape(m * r, m * r)
-        matrix[:-1, -2:] = self.both.reshape(m * r, 2)
+        matrix[:-1, -2:] = self.by_pair.reshape(m * r, 2)
         matrix[-1, :-2], matrix[-1, -2:] = self.phase.ravel(), self.last
         return matrix
 
@@ -63,7 +64,7 @@ class CyclicEquations:
         m, r, _ = self.pieces.shape
         # Each piece says: begin x[i] + end x[i + 1] + rest (p, q, -1) = 0.
         begin, end = self.pieces, np.broadcast_to(-self.after * np.eye(r), (m, r, r))
-        rest = np.concatenate([self.both, right[: m * r].reshape(m, r, 1)], axis=2)
+        rest = np.concatenate([self.by_pair, right[: m * r].reshape(m, r, 1)], axis=2)
         node = np.arange(m + 1)  # where pieces begin, and where the last one ends
         freed = []
         while len(begin) > 1:

@@ -148,7 +148,7 @@ def connections(
     index = flow.index(parameter)
     span = number("t_max", 20.0 * flow.clock if t_max is None else t_max, above=0.0)
     rests = [flow.reduced(rest.state) for rest in there]
-    found: list[Connection] = []
+    located: list[Connection] = []
     followed, whole_search = 0, True
     for k, rest in enumerate(rests):
         mirror = flow.mirror
@@ -161,18 +161,18 @@ def connections(
             manifold = _Manifold(flow, index, grid, rest, sign, span)
             followed += manifold.exists
             its, ended = manifold.connections(parameter)
-            found += [one for one in its if not any(_same(one, other) for other in found)]
+            located += [one for one in its if not any(_same(one, other) for other in located)]
             whole_search &= ended
     if not followed:
         raise ModelError("no equilibrium there has one eigenvalue alone on its side of the imaginary axis")
-    found.sort(key=lambda one: one.value)
+    located.sort(key=lambda one: one.value)
     search = (
         f"{followed} manifolds compared at {len(grid)} values of {parameter} from {low:g} to {high:g}, "
         f"each followed for {span:.4g}: longer ones may exist"
     )
     if not whole_search:
         search += ", and others in intervals that were not narrowed to the end"
-    return Connections(found, search)
+    return Connections(located, search)
 
 
 def _extent(model: Model, rests: list[Floats]) -> Floats:
@@ -261,12 +261,12 @@ class _Manifold:
         most = _FINE * (_LEAVES + lasts / flow.clock)
         require_memory("states of curves up to t_max", most, count, flow.dim, itemsize=16)
         for k in range(1, round(most)):
-            own = np.flatnonzero(going)
-            if not len(own):
+            rows_left = np.flatnonzero(going)
+            if not len(rows_left):
                 break
-            x[own] = self._on(rows[own], x[own], time[own] * step)
+            x[rows_left] = self._on(rows[rows_left], x[rows_left], time[rows_left] * step)
             states.append(x.copy())
-            end[own] = k
+            end[rows_left] = k
             scaled = np.linalg.norm((x - center) / size, axis=1)
             away_at = np.where(going & (scaled > _LEFT), np.minimum(away_at, k), away_at)
             going &= (scaled < _FAR) & ((k - away_at) * step < lasts)
@@ -296,7 +296,7 @@ class _Manifold:
         curves = self.curves(values, [rest for rest in self.rests if rest is not None])
         # Where the equilibrium was lost between two values, nothing is compared.
         pairs = [(a, b) for a, b in pairwise(curves) if b.value - a.value < 1.5 * spacing]
-        found: list[_Found] = []
+        located: list[_Found] = []
         followed = 0
         while pairs and followed < _MOST:
             wide = []
@@ -304,7 +304,7 @@ class _Manifold:
                 part = self._part(a, b)
                 if part is None:
                     continue
-                self._try(a, b, part, parameter, found)
+                self._try(a, b, part, parameter, located)
                 if b.value - a.value > _NARROW * max(abs(a.value), abs(b.value)):
                     wide.append((a, b))
             cuts = [np.linspace(a.value, b.value, _PARTS + 1)[1:-1] for a, b in wide]
@@ -318,7 +318,7 @@ class _Manifold:
             for k, (a, b) in enumerate(wide):
                 inner = between[k * (_PARTS - 1) : (k + 1) * (_PARTS - 1)]
                 pairs += list(pairwise([a, *inner, b]))
-        return [one for _, one in found], not pairs
+        return [one for _, one in located], not pairs
 
     def _part(self, a: _Curve, b: _Curve) -> _Part | None:
         """Where two curves part; none where they are alike for as long as is asked."""
@@ -349,7 +349,7 @@ class _Manifold:
         part = best or _Part(last, last, False, np.inf)
         return part if part.came <= latest else None
 
-    def _try(self, a: _Curve, b: _Curve, part: _Part, parameter: str, found: list[_Found]) -> None:
+    def _try(self, a: _Curve, b: _Curve, part: _Part, parameter: str, located: list[_Found]) -> None:
         """Newton's method, where two curves pass an equilibrium on its two sides."""
         width = b.value - a.value
         narrow = width < _TRIED * max(abs(a.value), abs(b.value))
@@ -357,18 +357,21 @@ class _Manifold:
             return
         kind = "heteroclinic" if part.image else "homoclinic"
         beside = _BESIDE * width
-        for came, one in found:
-            known = one.kind == kind and abs(came - part.came) < _SOONER * _FINE
-            if known and a.value - beside <= one.value <= b.value + beside:
+        for came, connection in located:
+            known = connection.kind == kind and abs(came - part.came) < _SOONER * _FINE
+            if known and a.value - beside <= connection.value <= b.value + beside:
                 return
         try:
-            one = self._solved(a, part.nearest, part.image, parameter)
+            connection = self._solved(a, part.nearest, part.image, parameter)
         except (ModelError, IntegrationError):
             return
-        if not self.grid[0] <= one.value <= self.grid[-1] or abs(one.value - a.value) > 2.0 * beside:
+        if (
+            not self.grid[0] <= connection.value <= self.grid[-1]
+            or abs(connection.value - a.value) > 2.0 * beside
+        ):
             return
-        if not any(_same(one, other) for _, other in found):
-            found.append((part.came, one))
+        if not any(_same(connection, other) for _, other in located):
+            located.append((part.came, connection))
 
     def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
         flow, step = self.flow, self.flow.clock / _FINE

@@ -138,15 +138,15 @@ class FamilyCurve(PeriodicOrbitCurve):
         """The direction (r,), in scaled coordinates, in which the kept quantity grows at the first node."""
         size, start = self.flow.size, self.nodes(u)[0]
         if self.conserved is not None:
-            found: Floats = self.conserved.at(self.flow, start)[1] * size
-            return found / (float(np.linalg.norm(found)) or 1.0)
+            gradient: Floats = self.conserved.at(self.flow, start)[1] * size
+            return gradient / (float(np.linalg.norm(gradient)) or 1.0)
         kept, sizes = self.kept_quantities(u)
         if self.free is None:
             return kept[:, -1]
         # Near a bifurcation the multiplier 1 comes twice as often: what is nearest to what was kept before.
         left = kept[:, np.append(sizes[:-1] < _FREE * sizes[0], True)]
-        found = left @ (left.T @ self.free)
-        return found / np.linalg.norm(found)
+        gradient = left @ (left.T @ self.free)
+        return gradient / np.linalg.norm(gradient)
 
     def require_one(self, u: Floats) -> None:
         """Refuse cycles that do not come in a family of one dimension.
@@ -167,31 +167,33 @@ class FamilyCurve(PeriodicOrbitCurve):
         residual, matrix = super().cyclic_equations(u)
         m, r = self.pieces, self.flow.dim
         free = self.slope(u) if self.free is None else self.free
-        last, both, pieces = slice((m - 1) * r, m * r), matrix.both.copy(), matrix.pieces
+        last, by_pair, pieces = slice((m - 1) * r, m * r), matrix.by_pair.copy(), matrix.pieces
         if self.conserved is None:
             residual[last] += free * u[-2]
-            both[:, :, 1] = both[:, :, 0]
-            both[:, :, 0] = 0.0
-            both[-1, :, 0] = free
+            by_pair[:, :, 1] = by_pair[:, :, 0]
+            by_pair[:, :, 0] = 0.0
+            by_pair[-1, :, 0] = free
         else:
             # At the start of the last piece, whose gap then depends on no other node.
             at, slope = self.conserved.at(self.flow, self.nodes(u)[-1])
             residual[last] += free * (at - self.value(u)) / self.scale
-            both[-1, :, 1] = -free
+            by_pair[-1, :, 1] = -free
             pieces = pieces.copy()
             pieces[-1] += np.outer(free, slope * self.flow.size * np.sqrt(m) / self.scale)
-        return residual, replace(matrix, pieces=pieces, both=both)
+        return residual, replace(matrix, pieces=pieces, by_pair=by_pair)
 
-    def _decided_functions(self, place: CurvePoint, found: Multipliers) -> TestFunctions:
+    def _decided_functions(self, place: CurvePoint, multipliers: Multipliers) -> TestFunctions:
         """Return the functions where one multiplier is 1 and the others are pairs with the product 1.
 
         The fold is that of the kept quantity.
         """
-        values, nothing = found.values, float("nan")
+        values, nothing = multipliers.values, float("nan")
         others = np.delete(np.arange(len(values)), np.argmin(np.abs(values - 1.0)))
         first = place.tangent[: self.flow.dim]
         fold = float(self.slope(place.u) @ first) * np.sqrt(self.pieces)
-        plus, minus = (product_less(found.log[others], found.phases[others], unit) for unit in (1.0, -1.0))
+        plus, minus = (
+            product_less(multipliers.log[others], multipliers.phases[others], unit) for unit in (1.0, -1.0)
+        )
         collision = discriminant(values[others])
         return TestFunctions(fold, plus, minus, nothing, np.zeros(0), values, collision)
 

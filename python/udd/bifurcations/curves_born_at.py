@@ -70,7 +70,7 @@ def _hopf_points(point: LocusPoint) -> list[BifurcationPoint]:
     surface, place = point._surface, point._place
     if surface is None or place is None:
         raise ModelError("this point was not made by udd.locus")
-    name, found = FUNCTIONS["Hopf"], []
+    name, points = FUNCTIONS["Hopf"], []
     try:
         slope = surface.slope(place, name)
     except (CorrectorFailed, IntegrationError) as error:
@@ -81,10 +81,10 @@ def _hopf_points(point: LocusPoint) -> list[BifurcationPoint]:
         for sign in (1.0, -1.0):
             try:
                 there = surface.zero(place, place.v + sign * step * along, normal, name, step)
-                found += _as_hopf(surface, there)
+                points += _as_hopf(surface, there)
             except (CorrectorFailed, IntegrationError):
                 continue
-    return found
+    return points
 
 
 def _as_hopf(surface: SolutionSurface, there: SurfacePoint) -> list[BifurcationPoint]:

@@ -148,14 +148,14 @@ def cascade(
         else:
             closer *= _CLOSER
             branch = _next(points, (low, high), closer)
-        found = branch.find(_KIND)
-        if not found:
+        doublings = branch.find(_KIND)
+        if not doublings:
             last = f"after that at {points[-1].value:.10g}" if points else "from the start"
             raise ModelError(
                 f"{len(points)} of {n} doublings are found: {last} the branch ends at {branch.ends[-1]}"
             )
         branches.append(branch)
-        points.append(found[0])
+        points.append(doublings[0])
     return Cascade(points[0].parameter, tuple(points), tuple(branches))
 
 

@@ -38,14 +38,19 @@ class Expansion:
 def expansion(flow: FlowMap, values: Floats, x: Floats, higher: bool = False, t: float = 0.0) -> Expansion:
     """The rates' derivatives at a reduced state; second and third ones where `higher` asks for them."""
     model = flow.with_values(values)
-    found = _core.expansion(model, t, flow.full(x).tolist(), higher)
+    derivatives = _core.expansion(model, t, flow.full(x).tolist(), higher)
     k = flow.kept
-    second, third = found["second"], found["third"]
+    second, third = derivatives["second"], derivatives["third"]
     if higher:
         second, third = second[np.ix_(k, k, k)], third[np.ix_(k, k, k, k)]
-    by_parameter = found["by_parameter"][:, k]
+    by_parameter = derivatives["by_parameter"][:, k]
     return Expansion(
-        found["rate"][k], found["by_state"][np.ix_(k, k)], by_parameter, second, third, found["surfaces"]
+        derivatives["rate"][k],
+        derivatives["by_state"][np.ix_(k, k)],
+        by_parameter,
+        second,
+        third,
+        derivatives["surfaces"],
     )
 
 

@@ -110,13 +110,13 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     count = max(whole("initial_states", initial_states, 1), len(_REACHES))
     require_memory(f"{count} initial states", count, 200 + 32 * dim, itemsize=1)
     flow = flow_of(model, given if len(given) else np.ones((1, dim)))
-    found = _Found(flow)
-    search = _all_of_polynomials(flow, found) or _some(flow, flow.reduced(given), count, found)
+    collected = _Found(flow)
+    search = _all_of_polynomials(flow, collected) or _some(flow, flow.reduced(given), count, collected)
     for x in flow.reduced(given):
         if refined(flow, flow.values, x) is None:
-            found.add_degenerate(x, nearest=False)
-    rests = [equilibrium_at(flow, flow.values, x) for x in found.regular]
-    for x, isolated in found.degenerate:
+            collected.add_degenerate(x, nearest=False)
+    rests = [equilibrium_at(flow, flow.values, x) for x in collected.regular]
+    for x, isolated in collected.degenerate:
         kind = "degenerate" if isolated else "not isolated"
         rests.append(replace(equilibrium_at(flow, flow.values, x), kind=kind, isolated=isolated))
     rests.sort(key=lambda rest: (rest.eigenvalues[0].real.round(9), *rest.state.round(9)))
@@ -165,7 +165,7 @@ class _Found:
 
     def _is_new(self, x: Floats) -> bool:
         known = [*self.regular, *(y for y, _ in self.degenerate)]
-        return all(_apart(self.flow, x, other) for other in known)
+        return all(_differ(self.flow, x, other) for other in known)
 
 
 def _without_rounding(flow: FlowMap, x: Floats) -> Floats:
@@ -195,7 +195,7 @@ def _law_of(flow: FlowMap) -> Law:
     return law
 
 
-def _all_of_polynomials(flow: FlowMap, found: _Found) -> str:
+def _all_of_polynomials(flow: FlowMap, collected: _Found) -> str:
     """Find all isolated equilibria of a law of polynomials or their quotients; say how, or "" for others."""
     fractions = numerators_of(flow)
     if fractions is None:
@@ -211,10 +211,10 @@ def _all_of_polynomials(flow: FlowMap, found: _Found) -> str:
         if np.abs(root.imag).max() < _REAL * (1.0 + np.abs(root).max()):
             x = root.real * flow.size
             if _defined(fractions[1], x):
-                found.add(refined(flow, flow.values, x))
+                collected.add(refined(flow, flow.values, x))
     for end in roots.multiple:
         if _defined(fractions[1], end.real * flow.size):
-            found.add_degenerate(end.real * flow.size)
+            collected.add_degenerate(end.real * flow.size)
     return f"all isolated equilibria: a homotopy with {paths} paths, the Bezout number"
 
 
@@ -232,7 +232,7 @@ def _some(flow: FlowMap, given: Floats, count: int, found: _Found) -> str:
     return f"Powell's method from {count} states within {', '.join(within)}{given_too}: others may exist"
 
 
-def _search(flow: FlowMap, given: Floats, count: int, found: _Found) -> None:
+def _search(flow: FlowMap, given: Floats, count: int, collected: _Found) -> None:
     """Find equilibria from given states (n, r) and from rounds of `count` states each.
 
     A round is followed by another in the box of what was found, as long as it finds something new within
@@ -240,7 +240,7 @@ def _search(flow: FlowMap, given: Floats, count: int, found: _Found) -> None:
     """
 
     def inside() -> list[Floats]:
-        return [x for x in found.regular if _within(flow, x)]
+        return [x for x in collected.regular if _within(flow, x)]
 
     points, guesses = qmc.Sobol(flow.dim, seed=3), [*given]
     singular: list[Floats] = []
@@ -255,7 +255,7 @@ def _search(flow: FlowMap, given: Floats, count: int, found: _Found) -> None:
         for guess in guesses:
             x, regular = _rest_from(flow, flow.values, guess)
             if regular:
-                found.add(x)
+                collected.add(x)
             elif (
                 x is not None
                 and _within(flow, x)
@@ -264,12 +264,12 @@ def _search(flow: FlowMap, given: Floats, count: int, found: _Found) -> None:
                 singular.append(x)
         before = len(inside())
         for guess in guesses[:: len(_REACHES)]:
-            while found.add(refined(flow, flow.values, guess, found.regular)):
+            while collected.add(refined(flow, flow.values, guess, collected.regular)):
                 pass
         if len(inside()) == before:
             break
     for x in singular[:_MOST_SINGULAR]:
-        found.add_degenerate(x)
+        collected.add_degenerate(x)
 
 
 def _within(flow: FlowMap, x: Floats) -> bool:
@@ -277,24 +277,24 @@ def _within(flow: FlowMap, x: Floats) -> bool:
     return bool((np.abs(x) <= _REACHES[-1] * flow.size).all())
 
 
-def _apart(flow: FlowMap, a: Floats, b: Floats) -> bool:
+def _differ(flow: FlowMap, a: Floats, b: Floats) -> bool:
     """Whether two states differ, by more than whole turns of angles."""
     gap = a - b
     return bool(np.abs((gap + flow.turns(gap)) / flow.size).max() > _SAME)
 
 
-def refined(flow: FlowMap, values: Floats, guess: Floats, known: Sequence[Floats] = ()) -> Floats | None:
+def refined(flow: FlowMap, values: Floats, guess: Floats, divided: Sequence[Floats] = ()) -> Floats | None:
     """The regular equilibrium that Powell's method finds from a guess, if it is one.
 
     Those that are `known` are divided out (deflation), so that the method goes elsewhere. A guess at which
     the rates are undefined is replaced by its absolute values.
     """
-    x, regular = _rest_from(flow, values, guess, known)
+    x, regular = _rest_from(flow, values, guess, divided)
     return x if regular else None
 
 
 def _rest_from(
-    flow: FlowMap, values: Floats, guess: Floats, known: Sequence[Floats] = ()
+    flow: FlowMap, values: Floats, guess: Floats, divided: Sequence[Floats] = ()
 ) -> tuple[Floats | None, bool]:
     """The state at which Powell's method finds no rates, and whether their derivatives are regular there."""
     unit, model = flow.clock / flow.size, flow.with_values(values)
@@ -313,20 +313,20 @@ def _rest_from(
         try:
             if not np.isfinite(rates(start)).all():
                 start = np.abs(start)
-            if len(known):
-                deflated, by_state = _deflated(rates, slopes, np.array(known) / flow.size)
+            if len(divided):
+                deflated, by_state = _deflated(rates, slopes, np.array(divided) / flow.size)
                 start = optimize.root(deflated, start, jac=by_state).x
-            found = optimize.root(rates, start, jac=slopes, options={"xtol": 1e-14})
+            result = optimize.root(rates, start, jac=slopes, options={"xtol": 1e-14})
         except (ModelError, ValueError):
             return None, False
-        if not np.abs(found.fun).max() < _REST * max(1.0, np.abs(found.x).max()):
+        if not np.abs(result.fun).max() < _REST * max(1.0, np.abs(result.x).max()):
             return None, False
-        matrix = slopes(found.x)
+        matrix = slopes(result.x)
         regular = bool(np.linalg.cond(matrix) < 1e12)
         if regular:
             # Near a multiple root rates are small too.
-            regular = _margin(flow, values, found.x, matrix) > _EXACT * max(1.0, np.abs(found.x).max())
-    return found.x * flow.size, regular
+            regular = _margin(flow, values, result.x, matrix) > _EXACT * max(1.0, np.abs(result.x).max())
+    return result.x * flow.size, regular
 
 
 def _margin(flow: FlowMap, values: Floats, scaled: Floats, matrix: Floats) -> float:
@@ -340,7 +340,7 @@ def _margin(flow: FlowMap, values: Floats, scaled: Floats, matrix: Floats) -> fl
 
 
 def _deflated(
-    rates: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], known: Floats
+    rates: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], divided: Floats
 ) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
     """Rates that do not vanish at known equilibria (n, r), and their slopes.
 
@@ -349,7 +349,7 @@ def _deflated(
     """
 
     def factor(x: Floats) -> tuple[float, Floats]:
-        away = x - known
+        away = x - divided
         squared = (away**2).sum(axis=1)
         value = np.prod(1.0 + 1.0 / squared)
         slope: Floats = -2.0 * value * (away / (squared * (1.0 + squared))[:, None]).sum(axis=0)

@@ -132,15 +132,15 @@ class FlowMap:
         begin = np.zeros(count) if t is None else t
         rows = np.tile(values, (count, 1))
         atol = self.atol * float(np.min(self.size)) * loose
-        found = _core.shoot(
+        ends = _core.shoot(
             self.model, rows, self.full(x), begin, spans, list(wanted), self.rtol * loose, atol
         )
         kept = self.kept
         return SegmentEnds(
-            found["x"][:, kept],
-            found["by_state"][:, kept][:, :, kept],
-            found["by_parameter"][:, kept],
-            found["rate"][:, kept],
+            ends["x"][:, kept],
+            ends["by_state"][:, kept][:, :, kept],
+            ends["by_parameter"][:, kept],
+            ends["rate"][:, kept],
         )
 
     def fly_each(self, values: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
@@ -172,10 +172,10 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing 
     # A component that happens to be small is no smaller than a tenth of the largest.
     seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))
     seen[seen < _NOTHING] = 0.0
-    found = coordinates_of(model, seen)
-    finite = np.where(np.isfinite(found.size), found.size, 1.0)
-    kept = np.flatnonzero(np.isfinite(found.size))
-    if depends_on_time(model, finite, 0.7371 * found.clock):
+    coordinates = coordinates_of(model, seen)
+    finite = np.where(np.isfinite(coordinates.size), coordinates.size, 1.0)
+    kept = np.flatnonzero(np.isfinite(coordinates.size))
+    if depends_on_time(model, finite, 0.7371 * coordinates.clock):
         if forcing is None:
             raise ModelError(
                 "the rates depend on time: such a model has no equilibria, and for its cycles the forcing's "
@@ -184,8 +184,8 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing 
         require_period(model, forcing, kept, finite[kept])
         period, _ = forcing.period(np.array(list(model.parameters.values())))
         mirror = mirror_of(model, kept, finite[kept], period)
-        return FlowMap(model, kept, finite[kept], found.clock, mirror, forcing, rtol)
-    mirror = found.mirrors[0][kept] if found.mirrors else None
+        return FlowMap(model, kept, finite[kept], coordinates.clock, mirror, forcing, rtol)
+    mirror = coordinates.mirrors[0][kept] if coordinates.mirrors else None
     if mirror is not None and (mirror > 0).all():
         mirror = None
-    return FlowMap(model, kept, finite[kept], found.clock, mirror, None, rtol)
+    return FlowMap(model, kept, finite[kept], coordinates.clock, mirror, None, rtol)

@@ -192,19 +192,19 @@ class _Paths:
         earlier, going = x.copy(), np.ones(count, dtype=bool)
         arrived = np.zeros(count, dtype=bool)
         for _ in range(_ROUNDS):
-            own = np.flatnonzero(going)
-            if not len(own):
+            active = np.flatnonzero(going)
+            if not len(active):
                 break
-            h = np.minimum(step[own], 0.75 * t[own])
-            y, good, easy = self._step(x[own], t[own], h, tolerance)
-            kept = own[good]
+            h = np.minimum(step[active], 0.75 * t[active])
+            y, good, easy = self._step(x[active], t[active], h, tolerance)
+            kept = active[good]
             watched = kept[t[kept] > _DECADES * _LAST]
             x[kept] = y[good]
             t[kept] -= h[good]
             earlier[watched] = x[watched]
-            step[own] = np.where(good, np.where(easy, 2.0, 1.0) * h, 0.5 * h)
-            arrived[own] = t[own] <= _LAST
-            going[own] = ~arrived[own] & (step[own] > _SHORTEST * t[own])
+            step[active] = np.where(good, np.where(easy, 2.0, 1.0) * h, 0.5 * h)
+            arrived[active] = t[active] <= _LAST
+            going[active] = ~arrived[active] & (step[active] > _SHORTEST * t[active])
         return x, earlier, arrived
 
     def _step(

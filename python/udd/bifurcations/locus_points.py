@@ -134,18 +134,18 @@ def watched_functions(
     """The functions whose zeros are special points of a curve, by name; `slope` is that of its function."""
     signs = point.functions
     if kind == "fold":
-        found = {
+        functions = {
             "bend": slope[0],
             "complex_pair": signs.complex_pair,
             "period_doubling": signs.period_doubling,
         }
     elif kind == "Hopf":
-        found = {"unit_multiplier": signs.unit_multiplier, "lyapunov": _first_lyapunov(point)}
+        functions = {"unit_multiplier": signs.unit_multiplier, "lyapunov": _first_lyapunov(point)}
     elif kind == "Neimark-Sacker":
-        found = {"unit_multiplier": signs.unit_multiplier, "period_doubling": signs.period_doubling}
+        functions = {"unit_multiplier": signs.unit_multiplier, "period_doubling": signs.period_doubling}
     else:
-        found = {"unit_multiplier": signs.unit_multiplier, "complex_pair": signs.complex_pair}
-    return found
+        functions = {"unit_multiplier": signs.unit_multiplier, "complex_pair": signs.complex_pair}
+    return functions
 
 
 def _function(kind: str, name: str, segment: Segment) -> Callable[[SurfacePoint], float]:
@@ -188,7 +188,7 @@ def points_between(
 ) -> list[tuple[float, LocusPoint]]:
     """The special points on a step between whose ends these functions change their signs, in order."""
     changed = [name for name, value in before.items() if value * after[name] < 0.0]
-    found = []
+    points = []
     for name in changed:
         if name == "lyapunov" and "unit_multiplier" in changed:
             continue  # it may pass infinity there
@@ -201,8 +201,8 @@ def points_between(
             continue
         what = _named(kind, name, place)
         if what:
-            found.append((part, _point(what, segment, part, place, function)))
-    return sorted(found, key=lambda one: one[0])
+            points.append((part, _point(what, segment, part, place, function)))
+    return sorted(points, key=lambda one: one[0])
 
 
 def _zero(segment: Segment, function: Callable[[SurfacePoint], float]) -> tuple[float, SurfacePoint]:
@@ -269,15 +269,15 @@ def _point(
 ) -> LocusPoint:
     surface = segment.surface
     numbers, curve = _coefficients(kind, place), place.curve
-    known = np.array([*surface.values(place), *numbers.values()])
+    values = np.array([*surface.values(place), *numbers.values()])
     try:
-        errors = _scatter(kind, segment, part, function) + rounding_of(known)
+        errors = _scatter(kind, segment, part, function) + rounding_of(values)
     except (CorrectorFailed, IntegrationError, ValueError, np.linalg.LinAlgError):
-        errors = np.full(len(known), np.nan)
+        errors = np.full(len(values), np.nan)
     names = curve.name, curve.flow.names[surface.second]
     bounds = dict(zip(numbers, errors[2:].tolist(), strict=True))
     solution = curve.solution(place.v[:-1])
-    return LocusPoint(kind, names, known[:2], errors[:2], solution, numbers, bounds, surface, place)
+    return LocusPoint(kind, names, values[:2], errors[:2], solution, numbers, bounds, surface, place)
 
 
 def _scatter(kind: str, segment: Segment, part: float, function: Callable[[SurfacePoint], float]) -> Floats:

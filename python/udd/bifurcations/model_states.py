@@ -14,7 +14,7 @@ from .flow_map import Floats
 __all__ = ["state_of_attractor"]
 
 
-def state_of_attractor(model: Model, found: Any) -> tuple[Model, Floats, float]:
+def state_of_attractor(model: Model, attractor: Any) -> tuple[Model, Floats, float]:
     """The model, a state and the period of one periodic attractor of a dataset of basins or of a diagram.
 
     Raises
@@ -23,18 +23,18 @@ def state_of_attractor(model: Model, found: Any) -> tuple[Model, Floats, float]:
         More than one attractor, another model's, or one that is not periodic.
     """
     names = model.state_names
-    prefix = "orbit_" if f"orbit_{names[0]}" in found else ""
-    if any(f"{prefix}{name}" not in found for name in names) or "period_time" not in found:
+    prefix = "orbit_" if f"orbit_{names[0]}" in attractor else ""
+    if any(f"{prefix}{name}" not in attractor for name in names) or "period_time" not in attractor:
         raise ModelError(
             f"an attractor of udd.basins or udd.bifurcation of a model of {', '.join(names)} is needed"
         )
-    points = [np.asarray(found[f"{prefix}{name}"], dtype=np.float64) for name in names]
-    if found["period_time"].ndim or any(component.ndim != 1 for component in points):
+    points = [np.asarray(attractor[f"{prefix}{name}"], dtype=np.float64) for name in names]
+    if attractor["period_time"].ndim or any(component.ndim != 1 for component in points):
         raise ModelError("one attractor is needed: select it, as in found.sel(number=1)")
-    time, state = float(found["period_time"]), np.array([component[0] for component in points])
+    time, state = float(attractor["period_time"]), np.array([component[0] for component in points])
     if not np.isfinite(time) or time <= 0.0 or not np.isfinite(state).all():
         raise ModelError("this attractor is not periodic")
-    parameter = str(found.attrs.get("parameter", ""))
-    if not prefix and parameter in model.parameters and parameter in found.coords:
-        model = model.with_parameters({parameter: float(found[parameter])})
+    parameter = str(attractor.attrs.get("parameter", ""))
+    if not prefix and parameter in model.parameters and parameter in attractor.coords:
+        model = model.with_parameters({parameter: float(attractor[parameter])})
     return model, state, time

@@ -36,12 +36,12 @@ def orbit_states(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
     rows = curve.values_at(u)[np.newaxis]
     if flow.forcing is None:
         method = "auto" if _core.has_series(model) else "dop853"
-        found = _core.ensemble(Batch(model, rows, starts, 1e-10, 1e-13), times, method)["states"]
+        runs = _core.ensemble(Batch(model, rows, starts, 1e-10, 1e-13), times, method)["states"]
     else:
         tight: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-13, "method": "auto"}
         each = zip(curve.begins(u), starts, strict=True)
-        found = np.array([simulate(model, t + times, start, **tight).state for t, start in each])
-    states: Floats = found[:, :-1].reshape(m * _BETWEEN, -1)
+        runs = np.array([simulate(model, t + times, start, **tight).state for t, start in each])
+    states: Floats = runs[:, :-1].reshape(m * _BETWEEN, -1)
     if curve.symmetric:
         image = flow.full(curve.mirror * flow.reduced(states))
         states = np.vstack([states, image])
@@ -88,7 +88,7 @@ def crossings_of(
             nodes = np.vstack([nodes, curve.mirror * nodes])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing
-            found = poincare(
+            crossings = poincare(
                 flow.with_values(curve.values_at(u)),
                 section,
                 4,
@@ -101,8 +101,8 @@ def crossings_of(
                 threads=1,
                 progress=False,
             )
-        real = np.isfinite(found.t)
-        own = found.state[real]
+        real = np.isfinite(crossings.t)
+        own = crossings.state[real]
         which += [i] * len(own)
         states += [*own]
     dim = len(branch.model.state_names)
@@ -114,7 +114,7 @@ def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:
 
     Not asked where the law has kinks, across which volumes may jump.
     """
-    flow, values, found = curve.flow, curve.values_at(u), multipliers_at(curve, u)
+    flow, values, multipliers = curve.flow, curve.values_at(u), multipliers_at(curve, u)
     if len(expansion(flow, values, curve.nodes(u)[0]).surfaces):
         return True
     states = flow.reduced(orbit_states(curve, u))
@@ -125,5 +125,5 @@ def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:
     each = zip(states, times.tolist(), strict=True)
     divergence = np.mean([np.trace(expansion(flow, values, x, t=t).by_state) for x, t in each])
     known = float(divergence) * curve.span(u)
-    rough = _LIOUVILLE * max(1.0, abs(known)) + float(np.minimum(found.error, 1e3).sum())
-    return bool(abs(float(found.log.sum()) - known) < rough)
+    rough = _LIOUVILLE * max(1.0, abs(known)) + float(np.minimum(multipliers.error, 1e3).sum())
+    return bool(abs(float(multipliers.log.sum()) - known) < rough)

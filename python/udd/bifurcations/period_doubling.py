@@ -52,7 +52,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     if not isinstance(curve, PeriodicOrbitCurve) or start is None:
         raise CorrectorFailed("the point is not one of a cycle")
     new, base, row = doubled(curve, start)
-    found: dict[float, tuple[CurvePoint, TestFunctions]] = {}
+    orbits: dict[float, tuple[CurvePoint, TestFunctions]] = {}
 
     def at(square: float, near: Floats) -> Floats:
         """The orbit at the square of an amplitude, from another one."""
@@ -64,7 +64,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
             place = corrected_point(new, guess, row)
         except IntegrationError as error:
             raise CorrectorFailed(str(error)) from None
-        found[square] = place, new.test_functions(place)
+        orbits[square] = place, new.test_functions(place)
         return place.u
 
     square = amplitude**2
@@ -75,7 +75,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
             raise CorrectorFailed("the branch does not lead there")
         square = part * expected
         u = at(square, u)
-    value = found[square][1].period_doubling
+    value = orbits[square][1].period_doubling
     # From the birth to the doubling the multiplier falls from 1 to -1: half of it and 1, nearly along a line.
     other = square * (1.0 + float(np.clip(value, -0.3, 0.3)))
     for _ in range(_MOST):
@@ -84,7 +84,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         if abs(other - square) <= _EXACT * square:
             break
         u = at(other, u)
-        before, value = value, found[other][1].period_doubling
+        before, value = value, orbits[other][1].period_doubling
         if abs(before) < _NOISE and abs(value) >= 0.5 * abs(before):
             break  # as near as rounding lets it come
         if not np.isfinite(value) or value == before:
@@ -92,13 +92,13 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
         square, other = other, other - value * (other - square) / (value - before)
     else:
         raise CorrectorFailed("the secant method does not converge")
-    place, signs = found[square]
+    place, signs = orbits[square]
     size = square**0.5
     errors = location_error(
         new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
     )
     own = point_at(new, _KIND, place, signs, size, errors)
     # Orbits beyond the doubling, from the secant method, are left out.
-    places = [Station(new, *found[s], s**0.5) for s in sorted(found) if s <= square]
+    places = [Station(new, *orbits[s], s**0.5) for s in sorted(orbits) if s <= square]
     way = BranchTrace(places, [own], "the point that was wanted")
     return branch_from([way], point.solution.model, point.parameter, f"born at a {_KIND}")

@@ -183,12 +183,12 @@ def closed(
 ) -> tuple[PeriodicOrbitCurve, Floats]:
     """The curve at whose present parameters the orbit closes, and the unknowns there."""
     # The parameter is fixed: any that does not vanish will do; a model may have none.
-    held = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
-    value = 0.0 if held == HELD else float(flow.values[held])
+    fixed = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
+    value = 0.0 if fixed == HELD else float(flow.values[fixed])
     scale = abs(value) or 1.0
     share = 1.0 if flow.forcing is None else span / flow.forcing.period(flow.values)[0]
     curve = PeriodicOrbitCurve(
-        flow, flow.values, held, scale, span, len(nodes), mirror, shift, nodes, np.zeros_like(nodes), share
+        flow, flow.values, fixed, scale, span, len(nodes), mirror, shift, nodes, np.zeros_like(nodes), share
     )
     guess = curve.pack(nodes, span, value)
     curve = curve.anchored(guess, first=True)  # the state that is returned is the one near the guess

@@ -142,13 +142,13 @@ class Polynomials:
         system the new one has a root of lower multiplicity (A. Leykin, J. Verschelde and A. Zhao,
         Theoretical Computer Science 359 (2006) 111).
         """
-        n, more = matrix.shape
+        n, added = matrix.shape
         equations: list[Mapping[tuple[int, ...], float]] = []
-        none = (0,) * more
+        none = (0,) * added
         for own in self.coefficients:
             equations.append({(*map(int, e), *none): c for e, c in zip(self.exponents, own, strict=True)})
         every, table = self._slopes
-        units = [tuple(int(i == k) for i in range(more)) for k in range(more)]
+        units = [tuple(int(i == k) for i in range(added)) for k in range(added)]
         for slope in table:
             terms: dict[tuple[int, ...], float] = {}
             for exponents, along in zip(every, slope.T @ matrix, strict=True):
@@ -156,8 +156,8 @@ class Polynomials:
                     terms[(*map(int, exponents), *unit)] = float(coefficient)
             equations.append(terms)
         last = {(*(0,) * n, *unit): float(c) for unit, c in zip(units, row, strict=True)}
-        equations.append(last | {(0,) * (n + more): -1.0})
-        return Polynomials.of(equations, n + more)
+        equations.append(last | {(0,) * (n + added): -1.0})
+        return Polynomials.of(equations, n + added)
 
 
 def _monomials(exponents: NDArray[np.intp], x: NDArray[Any]) -> NDArray[Any]:
@@ -205,15 +205,15 @@ def _cubic(flow: FlowMap) -> Polynomials | None:
     """The rates as polynomials of at most the third degree, if that is what they are."""
     probes = flow.size * np.random.default_rng(9).uniform(-2.0, 2.0, (_PROBES, flow.dim))
     try:
-        own = taylor_at(flow, flow.values, np.zeros(flow.dim))
+        taylor = taylor_at(flow, flow.values, np.zeros(flow.dim))
         rates = flow.model.rates(np.zeros(_PROBES), flow.full(probes))[:, flow.kept]
     except ValueError:
         return None
-    if not (np.isfinite(own.coefficients).all() and np.isfinite(rates).all()):
+    if not (np.isfinite(taylor.coefficients).all() and np.isfinite(rates).all()):
         return None
     if len(expansion(flow, flow.values, probes[0]).surfaces):
         return None
-    return own if (np.abs(own.values(probes) - rates) <= _SAME * own.sizes(probes)).all() else None
+    return taylor if (np.abs(taylor.values(probes) - rates) <= _SAME * taylor.sizes(probes)).all() else None
 
 
 def taylor_at(flow: FlowMap, values: Floats, x: Floats) -> Polynomials:
@@ -237,35 +237,35 @@ def _fraction(
     """A formula as one polynomial over another; None if it is none."""
     zero: tuple[int, ...] = (0,) * n
     stack: list[tuple[_Terms, _Terms]] = []
-    one: _Terms = {zero: (1.0, 1.0)}
+    unit: _Terms = {zero: (1.0, 1.0)}
     for name, takes, number in operations:
         taken = [stack.pop() for _ in range(takes)][::-1]
-        own: tuple[_Terms, _Terms] | None
+        fraction: tuple[_Terms, _Terms] | None
         if name in ("number", "parameter"):
             value = number if name == "number" else values[int(number)]
-            own = ({zero: (value, abs(value))} if value else {}), one
+            fraction = ({zero: (value, abs(value))} if value else {}), unit
         elif name == "state":
             k = places[int(number)]
-            own = None if k < 0 else ({tuple(int(i == k) for i in range(n)): (1.0, 1.0)}, one)
+            fraction = None if k < 0 else ({tuple(int(i == k) for i in range(n)): (1.0, 1.0)}, unit)
         else:
-            own = _combined(name, taken, number, one)
-        if own is None or max(map(len, own)) > _MOST_TERMS:
+            fraction = _combined(name, taken, number, unit)
+        if fraction is None or max(map(len, fraction)) > _MOST_TERMS:
             return None
-        if any(sum(exponents) > _MOST_DEGREE for side in own for exponents in side):
+        if any(sum(exponents) > _MOST_DEGREE for side in fraction for exponents in side):
             return None
-        stack.append(own)
+        stack.append(fraction)
     return stack[-1]
 
 
 def _combined(
-    name: str, taken: list[tuple[_Terms, _Terms]], number: float, one: _Terms
+    name: str, taken: list[tuple[_Terms, _Terms]], number: float, unit: _Terms
 ) -> tuple[_Terms, _Terms] | None:
     """Apply an operation to fractions."""
     if name == "^":
         power = number
         if len(taken) == 2:
             top, bottom = taken[1]
-            if any(map(any, top)) or bottom != one:
+            if any(map(any, top)) or bottom != unit:
                 return None
             power = next(iter(top.values()))[0] if top else 0.0
         if power != round(power) or abs(power) > _MOST_DEGREE:
@@ -273,12 +273,12 @@ def _combined(
         above, below = taken[0]
         if power < 0:
             above, below = below, above
-        result = one, one
+        result = unit, unit
         for _ in range(abs(round(power))):
             result = _times(result[0], above), _times(result[1], below)
         return result if result[1] else None
     if len(taken) == 1:
-        return (_times(taken[0][0], dict.fromkeys(one, (-1.0, 1.0))), taken[0][1]) if name == "-" else None
+        return (_times(taken[0][0], dict.fromkeys(unit, (-1.0, 1.0))), taken[0][1]) if name == "-" else None
     if len(taken) != 2 or name not in ("+", "-", "*", "/"):
         return None
     (a, b), (c, d) = taken

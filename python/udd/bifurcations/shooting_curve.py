@@ -142,15 +142,15 @@ class PeriodicOrbitCurve(SolutionCurve):
         """Return the same with the derivatives piece by piece."""
         m, r, size = self.pieces, self.flow.dim, self.flow.size
         weight = 1.0 / np.sqrt(m)
-        nodes, found = self.nodes(u), self.flight(u)
+        nodes, flight = self.nodes(u), self.flight(u)
         turn = np.ones((m, r))
         turn[-1] = self.mirror
-        ends = found.x * turn
+        ends = flight.x * turn
         ends[-1] += self.shift
         gaps = (ends - np.roll(nodes, -1, axis=0)) / size
-        by_state = self.flow.scaled(found.by_state * turn[:, :, None]) / weight
-        by_span = found.rate * turn / size * (self.clock / m)
-        by_value = found.by_parameter[:, :, 0] * turn / size * self.scale
+        by_state = self.flow.scaled(flight.by_state * turn[:, :, None]) / weight
+        by_span = flight.rate * turn / size * (self.clock / m)
+        by_value = flight.by_parameter[:, :, 0] * turn / size * self.scale
         forcing = self.flow.forcing
         if forcing is None:
             phase, along = float((self.across * (nodes - self.reference)).sum()), self.across * size / weight
@@ -158,15 +158,15 @@ class PeriodicOrbitCurve(SolutionCurve):
         else:
             # A piece also begins later if the pieces before it take longer.
             rates = self._rates_at_nodes(u)
-            moved = found.rate - np.einsum("mij,mj->mi", found.by_state, rates)
+            moved = flight.rate - np.einsum("mij,mj->mi", flight.by_state, rates)
             by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
             period, by_values = forcing.period(self.values_at(u))
             phase, along = (self.span(u) - self.share * period) / self.clock, np.zeros((m, r))
             by_own = 0.0 if self.parameter == HELD else float(by_values[self.parameter])
             last = np.array([1.0, -self.share * by_own * self.scale / self.clock])
         residual = np.append(gaps.ravel(), phase)
-        both = np.stack([by_span, by_value], axis=2)
-        return residual, CyclicEquations(by_state, 1.0 / weight, both, along, last)
+        by_pair = np.stack([by_span, by_value], axis=2)
+        return residual, CyclicEquations(by_state, 1.0 / weight, by_pair, along, last)
 
     def by_second(self, u: Floats, scale: float) -> Floats:
         """The equations' derivatives by the second parameter, in these units of it."""
@@ -197,14 +197,14 @@ class PeriodicOrbitCurve(SolutionCurve):
         Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
         A forced model keeps the whole derivatives (m, r, r), with all multipliers of the stroboscopic map.
         """
-        size, found = self.flow.size, self.flight(u)
+        size, flight = self.flow.size, self.flight(u)
         turn = np.ones((self.pieces, self.flow.dim))
         turn[-1] = self.mirror
-        scaled = self.flow.scaled(found.by_state * turn[:, :, None])
+        scaled = self.flow.scaled(flight.by_state * turn[:, :, None])
         if self.flow.forcing is not None:
             return np.ascontiguousarray(scaled)
         # Where one piece ends the next begins, in the same plane.
-        after = _planes(found.rate * turn / size)
+        after = _planes(flight.rate * turn / size)
         before = np.roll(after, 1, axis=0)
         factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before
         return np.ascontiguousarray(factors)
@@ -281,20 +281,25 @@ class PeriodicOrbitCurve(SolutionCurve):
 
     def test_functions(self, place: CurvePoint) -> TestFunctions:
         """Return the test functions at a point, from the runs that the point was corrected with."""
-        found = multipliers_at(self, place.u)
-        if not found.decided:
+        multipliers = multipliers_at(self, place.u)
+        if not multipliers.decided:
             nothing = float("nan")
             fold = float(place.tangent[-1])
-            return TestFunctions(fold, nothing, nothing, nothing, np.zeros(0), found.values)
-        return self._decided_functions(place, found)
+            return TestFunctions(fold, nothing, nothing, nothing, np.zeros(0), multipliers.values)
+        return self._decided_functions(place, multipliers)
 
-    def _decided_functions(self, place: CurvePoint, found: Multipliers) -> TestFunctions:
-        pairs = list(combinations(range(len(found.values)), 2))
+    def _decided_functions(self, place: CurvePoint, multipliers: Multipliers) -> TestFunctions:
+        pairs = list(combinations(range(len(multipliers.values)), 2))
         one, other = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-        logs, phases = found.log[one] + found.log[other], found.phases[one] * found.phases[other]
+        logs, phases = (
+            multipliers.log[one] + multipliers.log[other],
+            multipliers.phases[one] * multipliers.phases[other],
+        )
         complex_pair = product_less(logs, phases, 1.0) if pairs else float("nan")
-        plus, minus = (product_less(found.log, found.phases, unit) for unit in (1.0, -1.0))
-        return TestFunctions(float(place.tangent[-1]), plus, minus, complex_pair, np.zeros(0), found.values)
+        plus, minus = (product_less(multipliers.log, multipliers.phases, unit) for unit in (1.0, -1.0))
+        return TestFunctions(
+            float(place.tangent[-1]), plus, minus, complex_pair, np.zeros(0), multipliers.values
+        )
 
     def kind_at(self, name: str, here: TestFunctions) -> str:
         """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""

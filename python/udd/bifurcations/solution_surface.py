@@ -92,14 +92,14 @@ class SolutionSurface:
     def _curve_at(self, v: Floats) -> AnyCurve:
         return self.curve.with_second(self.second, float(v[-1] * self.scale))
 
-    def corrected(self, guess: Floats, near: SurfacePoint) -> SurfacePoint:
+    def corrected(self, guess: Floats, base: SurfacePoint) -> SurfacePoint:
         """The point of the surface across another one's plane through a guess.
 
         Raises
         ------
         CorrectorFailed
         """
-        first, second = near.plane
+        first, second = base.plane
 
         def step_at(v: Floats) -> Floats:
             curve, gap = self._curve_at(v), guess - v
@@ -129,7 +129,7 @@ class SolutionSurface:
         return np.array(slope)
 
     def zero(
-        self, near: SurfacePoint, guess: Floats, normal: Floats, name: str, reach: float
+        self, base: SurfacePoint, guess: Floats, normal: Floats, name: str, reach: float
     ) -> SurfacePoint:
         """The zero of a test function on the line through a guess along a direction (2,) of a plane.
 
@@ -139,10 +139,10 @@ class SolutionSurface:
             There is none within `reach`.
         """
         points: dict[float, SurfacePoint] = {}
-        across = near.ahead(normal)
+        across = base.ahead(normal)
 
         def at(distance: float) -> float:
-            points[distance] = self.corrected(guess + distance * across, near)
+            points[distance] = self.corrected(guess + distance * across, base)
             return float(getattr(points[distance].functions, name))
 
         try:
