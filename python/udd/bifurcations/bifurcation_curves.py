@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Locus", "locus"]
 
-_TURN = 0.9  # least cosine between one direction and the next
-_SHORTEST = 1e-6  # step
-_BESIDE = 0.02  # a step along a curve of Hopf points, on which a Bautin point is looked for,
-_TRIED = 40  # and how many
-_LOOP = 8  # points at least of a closed curve
+_TURN = 0.9  # Least cosine between one direction and the next.
+_SHORTEST = 1e-6  # Shortest step.
+_BESIDE = 0.02  # Step along a curve of Hopf points towards a Bautin point.
+_TRIED = 40  # Number of these steps.
+_LOOP = 8  # Least number of points of a closed curve.
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +56,11 @@ class Locus(Drawable):
     values : ndarray, shape (n, 2)
         Their values along the curve.
     solutions : tuple of Equilibrium, PeriodicOrbit or Connection
-        What bifurcates at each of them.
+        The solution that bifurcates at each of them.
     frequencies : ndarray, shape (n,)
         As in :class:`BifurcationPoint`.
     lyapunov_coefficients : ndarray, shape (n,)
-        Of Hopf bifurcations: where it changes its sign cycles are born stable on one side.
+        The first Lyapunov coefficients of Hopf bifurcations: at a zero the criticality changes.
     ends : tuple of str
         Why the curve ends, at its beginning and at its end.
     points : tuple of LocusPoint
@@ -130,14 +130,15 @@ def locus(
     ----------
     point : BifurcationPoint, LocusPoint or Connection
         A fold, a Hopf, Neimark-Sacker, symmetry-breaking or period-doubling point of
-        :func:`udd.continuation`; a homoclinic or heteroclinic orbit; or a point of another curve at which one
-        is born: the folds of cycles of a Bautin point, the homoclinic orbits of a Bogdanov-Takens point.
+        :func:`udd.continuation`, or a homoclinic or heteroclinic orbit. At a point of another curve, the
+        curve born there is followed: folds of cycles from a Bautin point, homoclinic orbits from a
+        Bogdanov-Takens point.
     parameter : str, optional
         The second parameter; by default that of the other curve.
     bounds, within : (float, float)
         The curve ends where the second or the first parameter leaves these bounds.
     ds, ds_max : float
-        The first and the longest step, in arclength: states count in typical sizes, a parameter in fifths of
+        The first and the longest step, in arclength. States count in typical sizes, a parameter in fifths of
         the way between its bounds, or in units of its value at the point if a bound is infinite.
     max_points : int
         Points at most, in either direction.
@@ -155,10 +156,10 @@ def locus(
     -----
     Equilibria or cycles over two parameters are a surface, on which the zeros of the function that makes the
     bifurcation are a curve. It is followed by its arclength in the tangent planes of the surface, each point
-    located by the secant method across the curve. So folds go on through cusps. Zeros of the coefficients of
-    the normal form along the curve are located by Brent's method: cusps, Bogdanov-Takens points (where curves
-    of Hopf points end), Bautin points (the first Lyapunov coefficient is zero) and zero-Hopf points. Bounds
-    come from the scatter of the values near by.
+    located by the secant method across the curve. So folds go on through cusps. Brent's method locates zeros
+    of the normal form's coefficients along the curve: cusps, Bogdanov-Takens points (at which curves of Hopf
+    points end), Bautin points (with a first Lyapunov coefficient of zero) and zero-Hopf points. Bounds come
+    from the scatter of the values near by.
 
     A curve of homoclinic orbits has its equilibrium among the unknowns, so it passes close to a fold of that
     equilibrium. If it ends in the fold, the end is "a saddle-node of equilibria" with its extrapolated place.
@@ -166,7 +167,7 @@ def locus(
 
     Examples
     --------
-    Where rotation becomes stable, ``w = (1 - B)/(B (1 + B))``:
+    Rotation becomes stable at ``w = (1 - B)/(B (1 + B))``:
 
     >>> import udd
     >>> rest = udd.equilibria(udd.DLE(2.5, B=0.2))[0]

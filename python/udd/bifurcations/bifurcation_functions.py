@@ -41,9 +41,9 @@ class TestFunctions:
         Zero where two multipliers have the product 1, or two eigenvalues the sum 0: Neimark-Sacker and Hopf
         bifurcations where they are a complex pair.
     surfaces : ndarray
-        Of equilibria: the functions of the law's switching surfaces.
+        The functions of the law's switching surfaces, for equilibria.
     collision : float
-        Of families where something is kept: zero where two pairs of multipliers meet, negative where they
+        For families with a conserved quantity: zero where two pairs of multipliers meet, negative where they
         have left the unit circle (or the real axis) together; NaN with fewer pairs.
     values : ndarray of complex
         Multipliers across the flow of the map that closes the orbit, or eigenvalues.

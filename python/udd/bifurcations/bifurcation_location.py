@@ -39,13 +39,13 @@ __all__ = [
     "point_at",
 ]
 
-_NODES = 12  # points of a curve about a pitchfork,
-_ENOUGH = 8  # of which so many at least
-_SAMPLES = 24  # equilibria about a bifurcation, in which rounding shows,
-_NEAR = 1e-5  # so near, in steps, that the curve is one of the second degree,
-_SHORT = 200  # pieces of a cycle up to which rounding is asked for
-_STEPS = 24  # along a curve, in either direction, until a bifurcation is met
-_SURE = 2.0  # and how far beyond the largest scatter the error may lie
+_NODES = 12  # Points of a curve about a pitchfork.
+_ENOUGH = 8  # Least number of them.
+_SAMPLES = 24  # Equilibria about a bifurcation, in which rounding shows.
+_NEAR = 1e-5  # Their distance, in steps: within it the curve is a parabola.
+_SHORT = 200  # Largest number of pieces of a cycle for which rounding is measured.
+_STEPS = 24  # Steps along a curve, in either direction, until a bifurcation is met.
+_SURE = 2.0  # Ratio of the bound to the largest scatter.
 
 
 def changes(before: TestFunctions, after: TestFunctions) -> list[str]:

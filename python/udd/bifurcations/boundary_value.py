@@ -17,13 +17,13 @@ from .solution_curve import HELD
 
 __all__ = ["ConnectingCurve"]
 
-_LONGER = 4.0  # times of the slowest decay that are added at both ends,
-_LONGEST = 30.0  # typical times at most
-_AHEAD = 1e-6  # scaled difference for derivatives of the conditions at the ends
-_FARTHEST = 0.3  # Newton step at most, in scaled unknowns
-_PATIENCE = 40  # Newton steps at most
-_COLLAPSED = 0.1  # of the guess: a smaller orbit has collapsed to its equilibrium
-_CUT = 5e-3  # share of the orbit's extent at which the orbit is cut before it is prolonged
+_LONGER = 4.0  # Time that is added at both ends, in times of the slowest decay.
+_LONGEST = 30.0  # The longest such time, in typical times.
+_AHEAD = 1e-6  # Scaled difference for derivatives of the conditions at the ends.
+_FARTHEST = 0.3  # Largest Newton step, in scaled unknowns.
+_PATIENCE = 40  # Number of Newton steps.
+_COLLAPSED = 0.1  # Size relative to the guess below which an orbit has collapsed to its equilibrium.
+_CUT = 5e-3  # Share of the orbit's extent at which it is cut before it is prolonged.
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class ConnectingCurve:
     reference, across : ndarray, shape (r,)
         The middle node does not move along the flow from the reference.
     weight : float
-        Of the nodes in the unknowns: the smaller it is, the more the parameters count in the arclength.
+        The weight of the nodes in the unknowns: the smaller it is, the more the parameters count.
     loose : float
         Multiplies the tolerances of the runs.
     """

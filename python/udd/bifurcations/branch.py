@@ -37,15 +37,15 @@ AnyCurve = EquilibriumCurve | PeriodicOrbitCurve
 
 @dataclass(frozen=True, eq=False)
 class BifurcationPoint(Drawable):
-    """Where a branch changes.
+    """A bifurcation point of a branch.
 
     Attributes
     ----------
     kind : str
-        Of equilibria and cycles: "fold", "branch point"; of equilibria: "Hopf", "border collision" (on a
-        surface where the law changes, the branch goes on) and "nonsmooth fold" (there, it turns back); of
-        cycles: "symmetry breaking", "period doubling", "Neimark-Sacker"; of families of cycles: "Krein
-        collision", where two pairs of multipliers meet on the unit circle and leave it.
+        "fold" and "branch point" for equilibria and cycles. For equilibria also "Hopf", "border collision"
+        (on a surface at which the law changes, the branch goes on) and "nonsmooth fold" (there, it turns
+        back). For cycles "symmetry breaking", "period doubling" and "Neimark-Sacker". For families of cycles
+        "Krein collision": two pairs of multipliers meet on the unit circle and leave it.
     parameter : str
     value : float
         The parameter's value.
@@ -57,10 +57,10 @@ class BifurcationPoint(Drawable):
     solution : Equilibrium or PeriodicOrbit
         What changes there.
     arclength : float
-        Where on the branch.
+        The place on the branch.
     frequency : float
-        Of the motion that a Hopf or a Neimark-Sacker bifurcation brings (the latter per unit of time, from
-        the angle of the multipliers), else NaN.
+        The frequency of the motion born at a Hopf or Neimark-Sacker bifurcation (the latter per unit of time,
+        from the angle of the multipliers), else NaN.
     lyapunov_coefficient : float
         The first Lyapunov coefficient of a Hopf bifurcation, else NaN.
     """
@@ -94,7 +94,7 @@ class BifurcationPoint(Drawable):
 
     @property
     def criticality(self) -> str:
-        """Whether a Hopf point is "supercritical" (cycles are born stable) or "subcritical"; else empty."""
+        """The type of a Hopf point: "supercritical" (cycles are born stable) or "subcritical"; else empty."""
         if np.isnan(self.lyapunov_coefficient):
             return ""
         return "supercritical" if self.lyapunov_coefficient < 0 else "subcritical"
@@ -129,7 +129,7 @@ class Branch(Drawable):
         Floquet multipliers of cycles, eigenvalues of equilibria.
     stable : ndarray of bool, shape (n,)
     symmetric : bool
-        Whether the solutions are their own mirror images.
+        True if the solutions are their own mirror images.
     arclength : ndarray, shape (n,)
     points : tuple of BifurcationPoint
         In the order of the arclength.
@@ -164,7 +164,7 @@ class Branch(Drawable):
     def crossings(
         self, section: str | None = None, direction: str | None = None
     ) -> tuple[NDArray[np.intp], Floats]:
-        """Where the cycles cross a section.
+        """Find the crossings of the cycles with a section.
 
         Parameters
         ----------

@@ -49,9 +49,9 @@ def continuation(
     Parameters
     ----------
     start : Equilibrium, PeriodicOrbit or BifurcationPoint
-        From :func:`udd.equilibria`, :func:`udd.periodic_orbit`, or from another branch: of a bifurcation
-        point the branch that is born there is followed (of a Hopf bifurcation the cycles, of a period
-        doubling those of twice the period, ...), away from it.
+        From :func:`udd.equilibria`, :func:`udd.periodic_orbit`, or from another branch. From a bifurcation
+        point the branch that is born there is followed, away from it: cycles from a Hopf bifurcation, cycles
+        of twice the period from a period doubling.
     parameter : str, optional
         One of ``model.parameters``; by default that of the bifurcation point. Cycles of a conservative model
         come in families while all parameters stay. These are followed over ``"period"``, or over the formula
@@ -59,9 +59,9 @@ def continuation(
     bounds : (float, float)
         The branch ends where the parameter leaves them.
     direction : {"both", "up", "down"}
-        Whether the parameter rises or falls from the start on, or the branch is followed both ways.
+        The direction of the parameter from the start on.
     ds, ds_max : float
-        The first and the longest step, in arclength: states count in typical sizes, the parameter in fifths
+        The first and the longest step, in arclength. States count in typical sizes, the parameter in fifths
         of the way between the bounds, or in units of its value at the start if a bound is infinite.
     max_points : int
         Points at most, in either direction.

@@ -43,7 +43,7 @@ class Diagram(Drawable):
     model : Model
     parameter : str
     scan : xarray.Dataset
-        Of :func:`udd.bifurcation`, on the way up and on the way down: points, attractors, hysteresis.
+        The result of :func:`udd.bifurcation`, up and down: points, attractors, hysteresis.
     branches : tuple of Branch
         Equilibria first, then cycles; of mirror images one.
     """
@@ -213,13 +213,13 @@ def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[Periodi
 
 
 def _same_point(a: BifurcationPoint, b: BifurcationPoint) -> bool:
-    """Whether two points are one, or mirror images of each other."""
+    """Return True if two points are the same, or mirror images of each other."""
     near = abs(a.value - b.value) <= np.nan_to_num(a.error) + np.nan_to_num(b.error) + rounding_of(a.value)
     return a.kind == b.kind and bool(near) and _same(a.solution, b.solution)
 
 
 def _has(branch: Branch, solution: Equilibrium | PeriodicOrbit, value: float) -> bool:
-    """Whether a branch has this equilibrium or cycle, or its mirror image."""
+    """Return True if a branch has this equilibrium or cycle, or its mirror image."""
     kind = "equilibrium" if isinstance(solution, Equilibrium) else "cycle"
     return branch.kind == kind and any(_same(own, solution) for own in branch.at(value))
 

@@ -16,10 +16,10 @@ from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["closes", "hopf_end", "origin_of", "size_of", "vanishing_part"]
 
-_RATIO = 1.3  # of the cycle's period to that of the Hopf bifurcation at most
-_FARTHEST = 3.0  # sizes of the cycle between its centre and the equilibrium
-_COLLAPSED = 0.02  # of its size before, below which an orbit is an equilibrium
-_SHORTEST = 1e-4  # step along the other branch
+_RATIO = 1.3  # Largest ratio of the cycle's period to that of the Hopf bifurcation.
+_FARTHEST = 3.0  # Largest distance of the equilibrium from the cycle's centre, in sizes of the cycle.
+_COLLAPSED = 0.02  # Size relative to that before, below which an orbit is an equilibrium.
+_SHORTEST = 1e-4  # Shortest step along the other branch.
 
 
 def vanishing_part(curve: AnyCurve, a: Floats, b: Floats) -> float | None:
@@ -80,7 +80,7 @@ def origin_of(curve: PeriodicOrbitCurve, u: Floats, step: float) -> BifurcationP
 def closes(
     start: tuple[AnyCurve, CurvePoint], curve: AnyCurve, here: CurvePoint, there: CurvePoint, step: float
 ) -> bool:
-    """Whether the branch passes its start between two points that lie `step` apart.
+    """Return True if the branch passes its start between two points that lie `step` apart.
 
     Cycles are compared without regard to where on them the first node lies.
     """

@@ -35,15 +35,15 @@ from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["CLOSED", "BranchTrace", "ContinuationLimits", "Station", "follow_branch"]
 
-_WATCHED = 6  # points in which a branch shows that it comes to a connection,
-_CONVERGED = 1e-11  # by this relative change of its parameter
-_GROWN = 1.005  # while the period grows by this factor
-_LOOP = 8  # points at least of a closed branch
-_NEARER = (1.0, 0.5, 0.2, 0.1, 0.05)  # parts of a step, within which a pitchfork is located
-_ASIDE = 1e-9  # from a corner, in scaled unknowns
-_SHRUNK = 0.1  # an orbit this much smaller than that before has shrunk to an equilibrium
-_SMALL = 0.1  # typical sizes: where no smaller orbit is found, this one may have come from a Hopf bifurcation
-_BEFORE = 0.95  # of the way to a Hopf point is the last cycle that is kept
+_WATCHED = 6  # Number of points in which a branch shows that it tends to a connection.
+_CONVERGED = 1e-11  # Largest relative change of its parameter in these points.
+_GROWN = 1.005  # Least growth of its period in these points.
+_LOOP = 8  # Least number of points of a closed branch.
+_NEARER = (1.0, 0.5, 0.2, 0.1, 0.05)  # Parts of a step, within which a pitchfork is located.
+_ASIDE = 1e-9  # Distance from a corner, in scaled unknowns.
+_SHRUNK = 0.1  # Size relative to that before, below which an orbit has shrunk to an equilibrium.
+_SMALL = 0.1  # Typical sizes: a smaller orbit that cannot be followed may come from a Hopf point.
+_BEFORE = 0.95  # Part of the way to a Hopf point at which the last cycle is kept.
 CLOSED = "the branch is closed"
 
 
@@ -157,7 +157,7 @@ class _Way(BranchTrace):
                 return
 
     def ends_at_hopf(self, here: Station, distance: float) -> bool:
-        """Note the Hopf point to which cycles shrink at a distance from `here`; False if there is none."""
+        """Note the Hopf point to which cycles shrink at a distance from `here`; return True if it exists."""
         curve, limits = here.curve, self.limits
         if not isinstance(curve, PeriodicOrbitCurve) or isinstance(curve, FamilyCurve):
             return False
@@ -280,7 +280,7 @@ def _prepared(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrb
 
 
 def _connection(way: BranchTrace) -> float | None:
-    """Where the parameter has come to a stand while the period goes on growing."""
+    """Return the parameter that has converged while the period goes on growing, or None."""
     if len(way.places) < _WATCHED:
         return None
     last = [

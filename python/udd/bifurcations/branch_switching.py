@@ -20,9 +20,9 @@ from .shooting_curve import PeriodicOrbitCurve
 __all__ = ["born_at", "doubled"]
 
 _HALVINGS = 24
-_BENT = 1.5  # largest difference from 4 of the ratio of two distances, at an amplitude and at half of it
-_ROUNDING = 1e-6  # a test function that is smaller has no sign
-_STILL = 1e-9  # a parameter that moves less does not move, as where a conservative cycle is born
+_BENT = 1.5  # Largest difference from 4 of the ratio of distances at an amplitude and at half of it.
+_ROUNDING = 1e-6  # Size of a test function below which its sign is rounding.
+_STILL = 1e-9  # Change below which the parameter is constant, as where a conservative cycle is born.
 
 
 def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurvePoint, float]:
@@ -81,7 +81,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
 def _nothing_between(
     curve: AnyCurve, point: BifurcationPoint, begins: float, half: CurvePoint, whole: CurvePoint
 ) -> bool:
-    """Whether a branch does as its normal form says, up to an amplitude and up to half of it.
+    """Return True if a branch agrees with its normal form up to an amplitude and up to half of it.
 
     It `begins` at this value of the parameter.
     """

@@ -24,9 +24,9 @@ from .solutions import Equilibrium
 
 __all__ = ["Connection", "connection", "found_by"]
 
-_TRIED = 8  # slowest nodes near which an equilibrium is looked for
-_PROLONGED = 8  # times at most, until the value
-_STANDS = 1e-13  # changes by less than this, relatively
+_TRIED = 8  # Number of slowest nodes near which an equilibrium is looked for.
+_PROLONGED = 8  # Largest number of prolongations.
+_STANDS = 1e-13  # Relative change below which the value has converged.
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +36,15 @@ class Connection(Drawable):
     Attributes
     ----------
     kind : {"homoclinic", "heteroclinic", "SNIC"}
-        Whether it comes back to the same equilibrium, or arrives at another one; "SNIC" if it comes back to a
-        fold of equilibria, a saddle-node on an invariant circle: then `state` is the longest cycle.
+        "homoclinic" if it comes back to the same equilibrium, "heteroclinic" if it arrives at another one,
+        "SNIC" if it comes back to a fold of equilibria (a saddle-node on an invariant circle). With a SNIC,
+        `state` is the longest cycle.
     parameter : str
     value : float
         The parameter's value: at others there is no such orbit.
     error : float
-        A bound of the value's error: how far it moved when the orbit was prolonged at both ends for the last
-        time, and how far it moves when runs are a hundred times less accurate.
+        A bound of the value's error: its change with the last prolongation of the orbit at both ends, and
+        with runs a hundred times less accurate.
     equilibrium : Equilibrium
         The one that the orbit leaves.
     t : ndarray, shape (n,)
@@ -116,7 +117,7 @@ def connection(branch: Branch) -> Connection:
     Parameters
     ----------
     branch : Branch
-        Of cycles, of :func:`udd.continuation`, whose period has grown long.
+        A branch of cycles of :func:`udd.continuation` whose period has grown long.
 
     Returns
     -------

@@ -24,10 +24,10 @@ from .solution_curve import HELD
 
 __all__ = ["ConnectionWay"]
 
-_SHORTEST = 1e-6  # step
-_SHAPE = 0.1  # weight of the orbit's shape in the arclength, relative to that of a parameter
-_FLAT = 5e-3  # typical sizes: an orbit whose ends are further away leaves or comes ever more slowly
-_ON = 1e-9  # part of a step within which a point lies on the bound
+_SHORTEST = 1e-6  # Shortest step.
+_SHAPE = 0.1  # Weight of the orbit's shape in the arclength, relative to that of a parameter.
+_FLAT = 5e-3  # Typical sizes between the ends and the equilibria: beyond, an orbit leaves too slowly.
+_ON = 1e-9  # Part of a step within which a point lies on the bound.
 
 
 @dataclass(frozen=True)

@@ -27,27 +27,27 @@ from .solutions import FoundList
 
 __all__ = ["Connections", "connections"]
 
-_FINE = 24  # states looked at in a typical time
-_ASIDE = 1e-3  # from equilibria, in typical sizes, begin runs that show the extent of the motion
-_AWAY = 1e-6  # from the equilibrium, in typical sizes, the manifold begins as a straight line
-_LEFT = 0.1  # further away it has left the equilibrium,
-_LEAVES = 80.0  # which takes as many typical times at most
-_SHOWN = 20.0  # typical times that show the extent of the motion
-_FAR = 30.0  # typical sizes, beyond which nothing comes back
-_BEND = 3.0  # typical sizes beyond which distances count less and less
-_APART = 0.6  # curves that stay nearer than this to each other are alike
-_NEAR = 1.0  # a passage at a larger distance is none
-_LOOSE = 10.0  # times 1e-13: so accurate are the runs
-_CLOSE = 3e-2  # from so near a passage Newton's method starts,
-_TRIED = 1e-6  # or from an interval this narrow: towards a slow spiral passages come nearer slowly;
-_NARROW = 1e-12  # none is cut that is narrower
-_BESIDE = 1e3  # widths of an interval, within which what passes as soon is what is known
-_SOONER = 0.5  # typical times
-_TRIES = 4  # to find an equilibrium
-_PARTS = 4  # into which an interval is cut
-_MOST = 30_000  # curves are compared at most
-_ROWS = 2000  # curves followed together
-_SAME = 1e-11  # relative distance of connections that are one
+_FINE = 24  # Samples in a typical time.
+_ASIDE = 1e-3  # Distance from equilibria, in typical sizes, at which runs begin that show the extent.
+_AWAY = 1e-6  # Distance from the equilibrium, in typical sizes, within which the manifold is straight.
+_LEFT = 0.1  # Distance at which the manifold has left the equilibrium.
+_LEAVES = 80.0  # Most typical times that this takes.
+_SHOWN = 20.0  # Typical times that show the extent of the motion.
+_FAR = 30.0  # Typical sizes, beyond which nothing comes back.
+_BEND = 3.0  # Typical sizes beyond which distances count less and less.
+_APART = 0.6  # Distance up to which curves are alike.
+_NEAR = 1.0  # Largest distance of a passage.
+_LOOSE = 10.0  # Tolerance of the runs, relative to 1e-13.
+_CLOSE = 3e-2  # Distance of a passage from which Newton's method starts.
+_TRIED = 1e-6  # Width of an interval from which it starts as well: slow spirals come nearer slowly.
+_NARROW = 1e-12  # Relative width of the narrowest interval that is cut.
+_BESIDE = 1e3  # Widths of an interval within which two connections of one time are the same.
+_SOONER = 0.5  # Typical times by which these times differ at most.
+_TRIES = 4  # Guesses of an equilibrium besides the first.
+_PARTS = 4  # Parts into which an interval is cut.
+_MOST = 30_000  # Largest number of curves that are compared.
+_ROWS = 2000  # Curves that are followed together.
+_SAME = 1e-11  # Relative distance of two results for one connection.
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +66,9 @@ class _Curve:
 
 @dataclass(frozen=True)
 class _Part:
-    """Where two curves part: when they came near the equilibrium that parts them, and were nearest to it.
+    """The passage at which two curves part: its begin, and its least distance from an equilibrium.
 
-    Whether it is the mirror image, and how near they were: infinite where none parts them.
+    `image` is True for the mirror image; `distance` is infinite if no equilibrium parts them.
     """
 
     came: int
@@ -102,7 +102,7 @@ def connections(
         Its other parameters stay.
     parameter : str
     bounds : (float, float)
-        Of the parameter, both finite.
+        The bounds of the parameter, both finite.
     n : int
         At so many values, equally far apart, the manifolds are compared at first.
     t_max : float, optional
@@ -123,11 +123,11 @@ def connections(
     -----
     If one eigenvalue of an equilibrium is alone on its side of the imaginary axis, the manifold along it is a
     pair of curves. These are followed forward or backward in time. An interval at whose ends they take
-    different courses is cut again and again; where they part at the equilibrium, or at its mirror image,
-    which they pass on two sides, there is a connection between, and Newton's method finds it as
-    :func:`udd.connection` does. About a connection with a slow spiral there are infinitely many others, which
-    take longer. Missed are those between neighbouring values at which the curves take one course, and a few
-    that lie nearer to each other than 1e-7.
+    different courses is cut again and again. If they pass the equilibrium, or its mirror image, on two sides,
+    there is a connection between them, and Newton's method finds it as :func:`udd.connection` does. About a
+    connection with a slow spiral there are infinitely many others, which take longer. Missed are those
+    between neighbouring values at which the curves take one course, and a few that lie nearer to each other
+    than 1e-7.
 
     Examples
     --------
@@ -234,7 +234,7 @@ class _Manifold:
         return None
 
     def curves(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
-        """The curve at each value, from beside the equilibrium until it has gone far or time is up."""
+        """Return the curve at each value, from near the equilibrium until it has gone far or time is up."""
         found: list[_Curve] = []
         for first in range(0, len(values), _ROWS):
             part = slice(first, first + _ROWS)
@@ -288,13 +288,13 @@ class _Manifold:
         return np.concatenate([self._on(rows[part], x[part], spans[part]) for part in parts])
 
     def connections(self, parameter: str) -> tuple[list[Connection], bool]:
-        """Those at which the curve changes its course, and whether the search came to an end."""
+        """Return those at which the curve changes its course, and True if the search is complete."""
         values = np.array([v for v, rest in zip(self.grid, self.rests, strict=True) if rest is not None])
         if not self.exists:
             return [], True
         spacing = float(self.grid[1] - self.grid[0])
         curves = self.curves(values, [rest for rest in self.rests if rest is not None])
-        # Where the equilibrium was lost between two values, nothing is compared.
+        # If the equilibrium was lost between two values, nothing is compared.
         pairs = [(a, b) for a, b in pairwise(curves) if b.value - a.value < 1.5 * spacing]
         located: list[_Found] = []
         followed = 0
@@ -321,7 +321,7 @@ class _Manifold:
         return [one for _, one in located], not pairs
 
     def _part(self, a: _Curve, b: _Curve) -> _Part | None:
-        """Where two curves part; none where they are alike for as long as is asked."""
+        """Return the passage at which two curves part; None if they stay alike."""
         flow = self.flow
         many = min(len(a.path), len(b.path))
         one, other = (_bent(c.path[:many] - c.rest, flow) for c in (a, b))

@@ -37,7 +37,7 @@ class Conserved:
     ----------
     text : str
     law : FormulaModel
-        Of the same states; the first of them has the quantity for its rate.
+        The same states; the first of them has the quantity for its rate.
     """
 
     text: str
@@ -87,11 +87,10 @@ class FamilyCurve(PeriodicOrbitCurve):
     """Scaled nodes of a cycle where something is kept, its time, and what singles it out of its family.
 
     Conservation makes one of the equations depend on the others. So the last gap may be of any size in the
-    direction in which the quantity grows: one more unknown, which is zero in every solution, since an orbit
-    comes back with what it had (the unfolding of F. J. Munoz-Almaraz et al., Physica D 181 (2003) 1). If
-    the family is followed over the period, this unknown has the place that the time has in other curves, and
-    the time has the parameter's. Over a conserved quantity it is the difference of the orbit's quantity from
-    the parameter.
+    direction in which the quantity grows. This size is one more unknown, and zero in every solution (the
+    unfolding of F. J. Munoz-Almaraz et al., Physica D 181 (2003) 1). If the family is followed over the
+    period, this unknown has the place that the time has in other curves, and the time has the parameter's.
+    Over a conserved quantity it is the difference of the orbit's quantity from the parameter.
 
     Attributes
     ----------

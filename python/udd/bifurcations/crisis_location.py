@@ -27,28 +27,28 @@ from .transient_lifetimes import first_stay
 
 __all__ = ["Crisis", "crises"]
 
-_AWAY = 1e-4  # from the cycle, in typical sizes, the manifold begins as a straight line
-_SLOW = 1.1  # with a smaller multiplier the cycle is too near its fold: the manifold hardly leaves it
-_LEFT = 0.3  # typical sizes along the manifold: further away it has left the cycle
-_NEAR = 0.1  # a passage within this distance of the cycle, also one round later, is one beside the cycle
-_AGREES = 2.0  # by this factor at most a passage differs from what the multiplier says
-_HALVINGS = 12  # of an interval at most, until passages lie close to the stable manifold
-_CLOSE = 1e-3  # typical sizes: so near the stable manifold the fold of the unstable one is looked at
-_TIPS = 4  # folds that are tried at a time, earliest first
-_TRIES = 4
-_WIDE, _NARROW = 1e-3, 1e-4  # of a fold, in rounds: of a first guess, and of one at a value near by
+_AWAY = 1e-4  # Distance from the cycle, in typical sizes, within which the manifold is straight.
+_SLOW = 1.1  # Least multiplier: nearer to its fold the manifold hardly leaves the cycle.
+_LEFT = 0.3  # Typical sizes along the manifold at which it has left the cycle.
+_NEAR = 0.1  # Largest distance from the cycle of a passage, and of the same orbit one round later.
+_AGREES = 2.0  # Largest factor between the growth in this round and the multiplier.
+_HALVINGS = 12  # Halvings of an interval until passages lie close to the stable manifold.
+_CLOSE = 1e-3  # Typical sizes: folds this near the stable manifold are solved for.
+_TIPS = 4  # Folds that are tried at a time, earliest first.
+_TRIES = 4  # Rounds of such trials.
+_WIDE, _NARROW = 1e-3, 1e-4  # Widths of a fold, in rounds: of a first guess, and at a value near by.
 _STENCIL = np.linspace(-1.0, 1.0, 7)
-_FOLDS = 40  # steps to a fold at most
-_STAYS = 20  # crossings in a row near the attractor that mean that an orbit stays there
-_AGE = 400  # typical times for which the manifold's other side is followed, twice
-_OTHERS = 48  # orbits of it
-_MOST, _SOME = 0.9, 0.05  # shares of them
-_ASIDE = 1e-5  # relative: so far from the crisis the attractor is looked at
+_FOLDS = 40  # Steps to a fold at most.
+_STAYS = 20  # Crossings in a row near the attractor of an orbit that stays there.
+_AGE = 400  # Typical times for which the manifold's other side is followed, twice.
+_OTHERS = 48  # Orbits of the other side.
+_MOST, _SOME = 0.9, 0.05  # Shares of these orbits.
+_ASIDE = 1e-5  # Relative distance from the crisis at which the attractor is examined.
 
 
 @dataclass(frozen=True, eq=False)
 class Crisis(Drawable):
-    """Where a chaotic attractor meets a saddle cycle.
+    """A tangency at which a chaotic attractor meets a saddle cycle.
 
     Attributes
     ----------
@@ -60,13 +60,13 @@ class Crisis(Drawable):
     value : float
         The parameter's value.
     error : float
-        A bound of the tangency's error: how far it moved with the last round about the cycle, how far it
-        moves when runs are a hundred times less accurate, and when the manifold begins ten times further from
-        the cycle. It does not cover an earlier tangency that the `returns` do not show.
+        A bound of the tangency's error: its change with the last round about the cycle, with runs a hundred
+        times less accurate, and with a manifold that begins ten times further from the cycle. It does not
+        cover an earlier tangency that the `returns` do not show.
     side : {"below", "above"}
-        Where the attractor is the smaller one: of the value.
+        The side of the value on which the attractor is the smaller one.
     returns : int
-        How many passages beside the cycle were looked at just before the value. None of them is beyond the
+        The number of passages near the cycle that were examined just before the value. None is beyond the
         stable manifold, so there is no earlier tangency among them.
     cycle : PeriodicOrbit
         The saddle cycle at the value.
@@ -102,13 +102,13 @@ class Crisis(Drawable):
 
 @checked_arguments
 def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
-    """Where chaotic attractors meet the saddle cycles of a branch: boundary, interior and merging crises.
+    """Find boundary, interior and merging crises of chaotic attractors at the saddle cycles of a branch.
 
     Parameters
     ----------
     branch : Branch
-        Of cycles over a parameter, from :func:`udd.continuation`. Its saddle cycles with one multiplier
-        above 1 are looked at, such as those born with a window at its fold.
+        Cycles over a parameter, from :func:`udd.continuation`. Its saddle cycles with one multiplier above 1
+        are examined, such as those born with a window at its fold.
     n : int
         How many orbits of the unstable manifold are followed.
     depth : int
@@ -156,7 +156,7 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
 
 @dataclass(frozen=True)
 class _Passages:
-    """Passages beside the cycle: of which orbit (its `u`), when, and how far on the attractor's side."""
+    """Passages near the cycle: the orbits' `u`, the times, and the heights on the attractor's side."""
 
     u: Floats
     t: Floats
@@ -164,7 +164,7 @@ class _Passages:
 
     @property
     def crossed(self) -> bool:
-        """Whether some are beyond the stable manifold."""
+        """True if some are beyond the stable manifold."""
         return bool((self.height < 0.0).any())
 
     def nearest(self) -> list[tuple[float, float]]:

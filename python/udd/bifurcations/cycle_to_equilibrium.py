@@ -25,14 +25,14 @@ from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["CycleConnection", "cycle_connections"]
 
-_AWAY = 1e-6  # from the equilibrium, in typical sizes, the manifold begins as a straight line
-_FINE = 24  # states looked at in a typical time
-_NEAR = 1.0  # a passage at a larger distance, in typical sizes, is none
-_REACH = 3.0  # nor one that is so far away just after it has crossed the plane
-_LEFT = 0.5  # further away it has left the equilibrium
-_FAR = 30.0  # typical sizes, beyond which nothing comes back
-_LEAVES = 80.0  # typical times that it takes at most to leave the equilibrium and to come to the cycle
-_ONTO = 1e-4  # typical sizes: so near the orbit comes to the cycle in the end
+_AWAY = 1e-6  # Distance from the equilibrium, in typical sizes, within which the manifold is straight.
+_FINE = 24  # Samples in a typical time.
+_NEAR = 1.0  # Largest distance of a passage in the plane, in typical sizes.
+_REACH = 3.0  # The same just after the orbit has crossed the plane.
+_LEFT = 0.5  # Distance at which the manifold has left the equilibrium.
+_FAR = 30.0  # Typical sizes, beyond which nothing comes back.
+_LEAVES = 80.0  # Most typical times from the equilibrium to the cycle.
+_ONTO = 1e-4  # Largest distance from the cycle in the end, in typical sizes.
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,8 @@ class CycleConnection(Drawable):
     value : float
         The parameter's value: at others there is no such orbit.
     error : float
-        A bound of the value's error: how far it moved with the last round about the cycle, how far it moves
-        when runs are a hundred times less accurate, and when the orbit begins ten times further from the
-        equilibrium.
+        A bound of the value's error: its change with the last round about the cycle, with runs a hundred
+        times less accurate, and with an orbit that begins ten times further from the equilibrium.
     equilibrium : Equilibrium
     cycle : PeriodicOrbit
         Both at the value.
@@ -70,12 +69,12 @@ class CycleConnection(Drawable):
 
 @checked_arguments
 def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleConnection]:
-    """Where an equilibrium and the cycles of a branch are connected.
+    """Find the values at which an equilibrium and the cycles of a branch are connected.
 
     Parameters
     ----------
     branch : Branch
-        Of saddle cycles with one multiplier outside the unit circle (or one inside).
+        A branch of saddle cycles with one multiplier outside the unit circle (or one inside).
     equilibrium : Equilibrium
         With one growing direction (or one decaying), at any value of the branch's parameter.
 

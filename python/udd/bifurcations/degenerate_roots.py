@@ -14,21 +14,21 @@ __all__ = ["Law", "degenerate_root"]
 #: Scaled rates about a point, as polynomials of the distance from it.
 Law = Callable[[Floats], Polynomials]
 
-_ZERO = 1e-6  # a singular value below this, of equations whose coefficients are of size 1, is zero
-_ASIDE = 0.03  # so far away, in sizes of the point, another root of a set of roots is looked for
-_SOLVED = 1e-11  # rates, relative to their terms, that are none
-_MOVED = 0.3  # of its size by which the root is away from the guess at most
-_STEPS = 60
-_DEPTH = 4  # deflations at most,
-_MOST_VARIABLES = 20  # and unknowns
-_SNAPPED = 1e-3  # relative: a component nearer to 0 is 0 if nothing moves there
-_ROUNDING = 1e-15
-_NEAREST = 40  # steps towards the point of a set that is nearest to the origin
-_ROUNDS = 4  # expansions of the law
+_ZERO = 1e-6  # Largest singular value that is zero, if all coefficients are of size 1.
+_ASIDE = 0.03  # Distance of another root of a set of roots, in sizes of the point.
+_SOLVED = 1e-11  # Rates, relative to their terms, that are zero.
+_MOVED = 0.3  # Largest distance from the guess, in sizes of the root.
+_STEPS = 60  # Steps of the method of Gauss and Newton.
+_DEPTH = 4  # Largest number of deflations.
+_MOST_VARIABLES = 20  # Largest number of unknowns.
+_SNAPPED = 1e-3  # Relative: a smaller component is 0 if nothing moves there.
+_ROUNDING = 1e-15  # Rates that are rounding.
+_NEAREST = 40  # Steps towards the point of a set that is nearest to the origin.
+_ROUNDS = 4  # Expansions of the law.
 
 
 def degenerate_root(law: Law, x: Floats, nearest: bool) -> tuple[Floats, bool] | None:
-    """The degenerate root near a point, and whether it is isolated; None if there is none.
+    """Return the degenerate root near a point, and True if it is isolated; or None.
 
     If roots form a set, it is the point near `x`, or the one that is `nearest` to the origin.
     """
@@ -60,7 +60,7 @@ def degenerate_root(law: Law, x: Floats, nearest: bool) -> tuple[Floats, bool] |
 
 
 def _vanishes(system: Polynomials, x: Floats) -> bool:
-    # Where all coefficients are of size 1 so are the terms of a generic point.
+    # If all coefficients are of size 1, so are the terms at a generic point.
     return bool((np.abs(system.values(x)) <= _SOLVED * np.maximum(system.sizes(x), 1.0)).all())
 
 
@@ -74,7 +74,7 @@ def _null(system: Polynomials) -> Floats:
 
 
 def _descended(system: Polynomials, x: Floats) -> Floats:
-    """Where the method of Gauss and Newton arrives: a root, however singular."""
+    """Return the root, however singular, at which the method of Gauss and Newton arrives."""
     for _ in range(_STEPS):
         step = np.linalg.lstsq(system.slopes(x), -system.values(x), rcond=1e-9)[0]
         x = x + step
@@ -84,7 +84,7 @@ def _descended(system: Polynomials, x: Floats) -> Floats:
 
 
 def _on_a_set(law: Law, x: Floats) -> bool:
-    """Whether other roots lie in any neighbourhood, along a direction in which the rates do not change."""
+    """Return True if other roots lie arbitrarily near, along a direction in which the rates are constant."""
     null, random = _null(law(x)), np.random.default_rng(7)
     away = _ASIDE * (1.0 + float(np.abs(x).max()))
     for _ in range(3):

@@ -62,7 +62,7 @@ class Cascade(Drawable):
 
     @property
     def limit(self) -> float:
-        """Where the doublings accumulate, extrapolated from the last three (Aitken); NaN of fewer."""
+        """The limit of the doublings, extrapolated from the last three (Aitken); NaN of fewer."""
         return _aitken(self.values)
 
     @property

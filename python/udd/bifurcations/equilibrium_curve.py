@@ -19,8 +19,8 @@ from .solutions import Equilibrium, kind_of_rest
 
 __all__ = ["EquilibriumCurve", "equilibrium_at", "expansion"]
 
-_SAMPLES = 12  # equilibria about a Hopf point, in which rounding shows,
-_NEAR = 1e-5  # so near along the branch
+_SAMPLES = 12  # Equilibria about a Hopf point, in which rounding shows.
+_NEAR = 1e-5  # Their distance along the branch.
 
 
 @dataclass(frozen=True)

@@ -26,18 +26,18 @@ from .solutions import Equilibrium, FoundList
 
 __all__ = ["Equilibria", "equilibria", "refined"]
 
-_SAME = 1e-7  # two within this part of the typical sizes are one
-_REST = 1e-9  # rates, in typical sizes per typical time, that are as good as none
-_REACHES = (0.3, 1.0, 3.0, 10.0)  # boxes in which the search starts, in typical sizes
-_ROUNDS = 8  # rounds of a search at most
-_WIDER = 1.25  # than what was found before is the box of a later round
-_ROUNDING = 1e-13  # of the typical size, below which a component may be rounding
-_MOST_PATHS = 600  # of a homotopy: some seconds
-_REAL = 1e-8  # relative: a root with smaller imaginary parts is real
-_EXACT = 1e-6  # typical sizes: nearer to where the derivatives are singular an equilibrium is degenerate
-_CLEAR = 1e-3  # a least singular value above this is not that of a degenerate equilibrium
-_ONE = 1e-2  # singular states nearer than this, in typical sizes, come from one equilibrium
-_MOST_SINGULAR = 16  # of them are looked at
+_SAME = 1e-7  # Distance of two results for one equilibrium, in typical sizes.
+_REST = 1e-9  # Rates, in typical sizes per typical time, that are zero.
+_REACHES = (0.3, 1.0, 3.0, 10.0)  # Boxes in which the search starts, in typical sizes.
+_ROUNDS = 8  # Largest number of rounds of a search.
+_WIDER = 1.25  # Size of a later box, relative to the extent of the equilibria.
+_ROUNDING = 1e-13  # Component, relative to the typical size, that may be rounding.
+_MOST_PATHS = 600  # Largest number of paths of a homotopy: some seconds.
+_REAL = 1e-8  # Relative imaginary part of a real root.
+_EXACT = 1e-6  # Distance from singular derivatives, in typical sizes, of a degenerate equilibrium.
+_CLEAR = 1e-3  # Least singular value beyond which an equilibrium is not degenerate.
+_ONE = 1e-2  # Distance of singular states that come from one equilibrium, in typical sizes.
+_MOST_SINGULAR = 16  # Largest number of singular states that are refined.
 
 
 class Equilibria(FoundList[Equilibrium]):
@@ -219,7 +219,7 @@ def _all_of_polynomials(flow: FlowMap, collected: _Found) -> str:
 
 
 def _defined(below: Polynomials, x: Floats) -> bool:
-    """Whether no denominator vanishes at a state."""
+    """Return True if no denominator vanishes at a state."""
     return bool((np.abs(below.values(x)) > _REST * below.sizes(x)).all())
 
 
@@ -273,12 +273,12 @@ def _search(flow: FlowMap, given: Floats, count: int, collected: _Found) -> None
 
 
 def _within(flow: FlowMap, x: Floats) -> bool:
-    """Whether a state lies within the largest box of the search."""
+    """Return True if a state lies within the largest box of the search."""
     return bool((np.abs(x) <= _REACHES[-1] * flow.size).all())
 
 
 def _differ(flow: FlowMap, a: Floats, b: Floats) -> bool:
-    """Whether two states differ, by more than whole turns of angles."""
+    """Return True if two states differ by more than whole turns of angles."""
     gap = a - b
     return bool(np.abs((gap + flow.turns(gap)) / flow.size).max() > _SAME)
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Multipliers", "multipliers_at"]
 
-_ROUGH = 1e-12  # relative error of a piece's derivatives: runs to the tolerance 1e-13, and rounding
-_KNOWN = 0.1  # a multiplier with a larger relative error has no sign of its own
-_WEAK = 0.5  # ... which does not matter where it is this far inside the unit circle
+_ROUGH = 1e-12  # Relative error of a piece's derivatives: runs to the tolerance 1e-13, and rounding.
+_KNOWN = 0.1  # Relative error beyond which the sign of a multiplier is open.
+_WEAK = 0.5  # Size below which this sign does not matter.
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Multipliers:
 
     @property
     def decided(self) -> bool:
-        """Whether it is known of each multiplier where it lies beside the unit circle."""
+        """True if the side of the unit circle is certain for each multiplier."""
         with np.errstate(over="ignore", invalid="ignore"):
             # A direction that dies out, as where a contact sticks, is zero to the last bit.
             weak = np.isneginf(self.log) | (np.exp(self.log) * (1.0 + self.error) < _WEAK)
@@ -60,7 +60,7 @@ def multipliers_at(curve: PeriodicOrbitCurve, u: Floats) -> Multipliers:
     """The multipliers of the orbit with these unknowns.
 
     The derivatives of the pieces, restricted to the planes across the flow at their ends, are never
-    multiplied with one another: weak multipliers are right beside strong ones.
+    multiplied with one another: weak multipliers are accurate next to strong ones.
     """
     factors = curve.factors_across(u)
     found = _core.floquet(factors)

@@ -26,7 +26,7 @@ _NOTHING = 1e-100  # a smaller state is 0 but for rounding
 
 @dataclass(frozen=True)
 class SegmentEnds:
-    """Where pieces of orbits end.
+    """The ends of pieces of orbits.
 
     States (m, r), derivatives by the starts (m, r, r) and by up to two parameters (m, r, 2), rates (m, r).
     """
@@ -48,7 +48,7 @@ class FlowMap:
     kept : ndarray of int (r,)
         The components of the state on which the rates depend.
     size : ndarray (r,)
-        What is large for each of them.
+        The typical size of each of them.
     clock : float
         A typical time.
     mirror : ndarray (r,) or None

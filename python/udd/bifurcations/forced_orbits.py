@@ -66,7 +66,7 @@ def forcing_of(model: Model, period: float | str) -> Forcing:
 def repeats(
     model: Model, kept: NDArray[np.intp], size: Floats, after: float, signs: Floats | None = None
 ) -> bool:
-    """Whether the rates are as before after this time, at states of the sizes (r,) in the components `kept`.
+    """Return True if the rates repeat after this time, at states of the sizes (r,) in the components `kept`.
 
     With `signs` (r,): whether those of states with these signs are, with these signs.
     """

@@ -14,22 +14,22 @@ __all__ = ["Roots", "bezout_number", "complex_roots"]
 
 Complex = NDArray[np.complex128]
 
-_FIRST = 0.05  # first step of the homotopy's parameter, which falls from 1 to 0
-_LAST = 1e-11  # of the parameter, where paths to multiple roots end
-_SHORTEST = 1e-9  # step, relative to the parameter: a path that needs a shorter one has failed
-_TOLERANCE = (1e-6, 1e-8, 1e-10)  # of a first Newton step on the path, from one attempt to the next
-_ROUNDS = 4000  # of steps at most
-_STEPS = 3  # of Newton's method at each step
-_REGULAR = 1e-11  # least quotient of the singular values at a simple root
-_SAME = 1e-7  # relative distance of two simple roots that are one
-_FAR = 1e7  # units beyond which a root lies at infinity
-_JUMP = 0.1  # of its own size, by which Newton's method moves the end of a path at most
-_DECADES = 100.0  # a path to a multiple root still moves while the parameter falls by this factor
+_FIRST = 0.05  # First step of the homotopy's parameter, which falls from 1 to 0.
+_LAST = 1e-11  # Parameter at which paths to multiple roots end.
+_SHORTEST = 1e-9  # Shortest step, relative to the parameter: with it a path has failed.
+_TOLERANCE = (1e-6, 1e-8, 1e-10)  # Largest first Newton step on the path, from one attempt to the next.
+_ROUNDS = 4000  # Largest number of steps.
+_STEPS = 3  # Newton steps at each of them.
+_REGULAR = 1e-11  # Least quotient of the singular values at a simple root.
+_SAME = 1e-7  # Relative distance of two results for one simple root.
+_FAR = 1e7  # Units beyond which a root lies at infinity.
+_JUMP = 0.1  # Largest change, relative to its size, by which Newton's method moves the end of a path.
+_DECADES = 100.0  # Factor of the parameter within which a path to a multiple root still moves.
 
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """Where the paths of a homotopy end.
+    """The ends of the paths of a homotopy.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def _clusters(ends: list[tuple[Complex, float]]) -> list[Complex]:
 
 
 def _polished(system: Polynomials, x: Complex) -> Complex | None:
-    """The simple root at which Newton's method arrives; None if there is none."""
+    """Return the simple root at which Newton's method arrives, or None."""
     for _ in range(12):
         matrix = system.slopes(x)
         sizes = np.linalg.svd(matrix, compute_uv=False)

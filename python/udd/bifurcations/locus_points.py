@@ -29,11 +29,11 @@ from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["ENDS", "LocusPlace", "LocusPoint", "LocusTrace", "Segment", "points_between", "watched_functions"]
 
-_NEAR = 1e-4  # radians in a typical time, or from 1: a pair that is so near to being real is real
-_ZERO = 1e-3  # of its values before and after, below which a function is zero where it changes its sign
-_SAMPLES = 8  # points about a special one, in which rounding shows
-_ASIDE = 1e-3  # of the segment
-_SURE = 2.0  # how far beyond the largest scatter the error may lie
+_NEAR = 1e-4  # Radians in a typical time, or from 1: a pair this near to the axis is real.
+_ZERO = 1e-3  # Size of a function at its zero, relative to its values before and after.
+_SAMPLES = 8  # Points about a special one, in which rounding shows.
+_ASIDE = 1e-3  # Their distance, in lengths of the segment.
+_SURE = 2.0  # Ratio of the bound to the largest scatter.
 
 #: Kinds at which a curve ends: beyond, its points are no bifurcations of its kind.
 ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("1:1 resonance", "1:2 resonance")}
@@ -46,16 +46,16 @@ class LocusPoint:
     Attributes
     ----------
     kind : str
-        Of equilibria "cusp", "Bogdanov-Takens", "Bautin" and "zero-Hopf"; of cycles "cusp", "1:1 resonance",
-        "1:2 resonance", "fold-flip", "fold-Neimark-Sacker" and "flip-Neimark-Sacker".
+        For equilibria "cusp", "Bogdanov-Takens", "Bautin" and "zero-Hopf". For cycles "cusp",
+        "1:1 resonance", "1:2 resonance", "fold-flip", "fold-Neimark-Sacker" and "flip-Neimark-Sacker".
     parameters : tuple of str
     values, errors : ndarray, shape (2,)
         The parameters' values, and bounds of their errors.
     solution : Equilibrium or PeriodicOrbit
     coefficients, coefficient_errors : dict of str to float
-        Those of the normal form, with bounds: "c" of a cusp, "a" and "b" of a Bogdanov-Takens point, "l2"
-        (the second Lyapunov coefficient) of a Bautin point, "s" and "theta" of a zero-Hopf point; empty for
-        cycles.
+        Those of the normal form, with bounds; empty for cycles. A cusp has "c", a Bogdanov-Takens point "a"
+        and "b". A Bautin point has "l2" (the second Lyapunov coefficient), a zero-Hopf point "s" and
+        "theta".
     """
 
     kind: str

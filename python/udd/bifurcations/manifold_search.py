@@ -17,10 +17,10 @@ from .flow_map import Floats
 
 __all__ = ["Accuracy", "brackets", "converge", "distinct", "secant"]
 
-_ROUNDS = 12  # about the cycle at most, until the parameter stands
-_STANDS = 1e-13  # by this relative change
-_STEPS = 50  # of the secant method at most
-_ALIKE = 1e-9  # relative distance of two values that are one
+_ROUNDS = 12  # Largest number of rounds about the cycle.
+_STANDS = 1e-13  # Relative change below which the parameter has converged.
+_STEPS = 50  # Steps of the secant method.
+_ALIKE = 1e-9  # Relative distance of two results for one value.
 
 Mark = TypeVar("Mark")
 Result = TypeVar("Result")

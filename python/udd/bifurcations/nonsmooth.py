@@ -10,11 +10,11 @@ from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point
 
 __all__ = ["corner_ahead"]
 
-_ON = 1e-13  # of the surface's function, relative to its change over the step
-_PART = 0.7  # of the distance to the surface, the longest step
-_LAST = 3e-8  # the longest last step: the square of it is rounding
-_SMALL = 1e-6  # for the slope of the surface's function along the branch
-_BEYOND = 1e-7  # so far beyond the corner the law of the other side is asked, in scaled unknowns
+_ON = 1e-13  # Size of the surface's function, relative to its change over the step, that is zero.
+_PART = 0.7  # Longest step, in distances to the surface.
+_LAST = 3e-8  # Longest last step: the square of it is rounding.
+_SMALL = 1e-6  # Step for the slope of the surface's function along the branch.
+_BEYOND = 1e-7  # Distance beyond the corner at which the other law is evaluated, in scaled unknowns.
 
 
 def corner_ahead(

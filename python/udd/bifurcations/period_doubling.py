@@ -19,11 +19,11 @@ from .shooting_curve import PeriodicOrbitCurve
 __all__ = ["next_doubling"]
 
 _KIND = "period doubling"
-_MOST = 12  # orbits that the secant method may take
-_NOISE = 1e-5  # of the test function, below which rounding may keep it from getting smaller
-_EXACT = 1e-11  # of the square of the amplitude, relative: of the way between two doublings
-_WAY = (0.1, 0.5, 1.0)  # of the square that is expected: each orbit is the guess of the next
-_FARTHEST = 1e4  # between the squares of the first amplitude and the one that is expected
+_MOST = 12  # Largest number of orbits of the secant method.
+_NOISE = 1e-5  # Size of the test function that may be rounding.
+_EXACT = 1e-11  # Relative error of the square of the amplitude, where the secant method ends.
+_WAY = (0.1, 0.5, 1.0)  # Parts of the expected square: each orbit is the guess of the next.
+_FARTHEST = 1e4  # Largest ratio of the expected square to that of the first amplitude.
 
 
 def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Branch:

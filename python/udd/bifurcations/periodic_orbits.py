@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 __all__ = ["closed", "flown", "half_of", "periodic_orbit", "pieces_for"]
 
-_FINE = 64  # states looked at in a typical time
-_CLOSE = 3e-2  # a return within this part of the typical sizes can be that of a cycle
-_SAME = 1e-7  # two states within this part of the sizes are one
-_HALF = 3e-2  # sizes by which the halves differ at most, at a bifurcation where the parameter turns
+_FINE = 64  # Samples in a typical time.
+_CLOSE = 3e-2  # Distance of a return that can be that of a cycle, in typical sizes.
+_SAME = 1e-7  # Distance of two states that are the same, in typical sizes.
+_HALF = 3e-2  # Largest difference of the halves, in typical sizes, where the parameter turns.
 _PRIMES = [k for k in range(2, 100) if all(k % p for p in range(2, k))]
-_LOOKS = 100  # states that show the extent of a cycle
-_WHOLE = 0.3  # of a cycle's extent that a few states of one round show at least
-_SINGULAR = (1e-2, 1e-4, 1e-7)  # singular values that count as zero, relative to the largest
-_FAMILY = 400  # unknowns up to which singular values are asked for
-_RESIDUAL = 1e-9  # gaps that are as good as none
+_LOOKS = 100  # States that show the extent of a cycle.
+_WHOLE = 0.3  # Least part of a cycle's extent that a few states of one round show.
+_SINGULAR = (1e-2, 1e-4, 1e-7)  # Singular values that count as zero, relative to the largest.
+_FAMILY = 400  # Largest number of unknowns for which singular values are computed.
+_RESIDUAL = 1e-9  # Gaps that are zero.
 
 
 @renamed(longest="max_period")
@@ -60,21 +60,21 @@ def periodic_orbit(
     Parameters
     ----------
     model : Model
-        Where its rates depend on time they must be periodic, with the `period` given. The disk's edge is
+        If its rates depend on time, they must be periodic, with the `period` given. The disk's edge is
         ignored.
     guess : array_like, shape (dim,) or (n, dim), or xarray.Dataset, optional
         A state near the cycle, or states on it at equal distances of time over one period, which must then
-        be given; or one attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
-        ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``: its state, its period and the
-        value of the parameter are taken. By default the search starts where :func:`udd.lyapunov` does.
+        be given. One attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
+        ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``, gives its state, its period and
+        the value of the parameter. By default the search starts where :func:`udd.lyapunov` does.
     period : float or str, optional
         About its period. By default the run from the guess tells it: the first time that it comes back, or
         nearly back, be it to the mirror image. A forced model needs exactly the forcing's period, or a
         multiple of it: a number, or a formula of the parameters such as ``"2*pi/w"``, by which it also
         changes along a branch.
     settle : float, optional
-        For so long the model is run from the guess before, to get near a stable cycle; by default 0, or 600
-        typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) where there is no guess. For a
+        The time for which the model is run from the guess before, to get near a stable cycle. By default it
+        is 0, or 600 typical times (4/sqrt(w) of the DLE, 0.9 s of the disk) without a guess. For a
         forced model this time is rounded up to whole periods; the guess is a state at time 0.
     max_period : float, optional
         The longest period looked for, by default 40 typical times.
@@ -91,10 +91,10 @@ def periodic_orbit(
 
     Notes
     -----
-    The orbit is cut into pieces that are followed to the tolerance 1e-13 by the Taylor method (by Dormand &
-    Prince's method of order 8 where the law has no power series), with derivatives from dual numbers;
-    Newton's method closes the gaps; where energy is kept, so that cycles come in families, the method of
-    Gauss and Newton finds one near the guess. Where the law has kinks, runs land on them. A cycle that is its
+    The orbit is cut into pieces. The Taylor method follows them to the tolerance 1e-13 (Dormand & Prince's
+    method of order 8 if the law has no power series), with derivatives from dual numbers. Newton's method
+    closes the gaps. If energy is kept, so that cycles come in families, the method of Gauss and Newton finds
+    one near the guess. Runs land on kinks of the law. A cycle that is its
     own mirror image is solved for over half its period. Cycles need not be stable: near a chaotic motion's
     close returns there are unstable ones.
 
@@ -194,7 +194,7 @@ def closed(
     curve = curve.anchored(guess, first=True)  # the state that is returned is the one near the guess
     tried = f"no cycle of period {curve.period(guess):.6g} is found near the guess"
     row = natural_constraint(guess)
-    # Where energy is kept cycles come in families: near one the equations leave a direction nearly free.
+    # If energy is kept, cycles come in families: near one the equations leave a direction nearly free.
     few = _SINGULAR if len(guess) < _FAMILY else ()
     ways: list[Callable[..., Floats]] = [newton_corrector]
     ways += [partial(nearest_of_family, singular=size) for size in few]

@@ -37,7 +37,7 @@ class Polynomials:
     Attributes
     ----------
     exponents : ndarray of int, shape (k, n)
-        Of the monomials of n variables.
+        The exponents of the monomials of n variables.
     coefficients : ndarray, shape (m, k)
         Of m equations.
     """

@@ -25,12 +25,12 @@ __all__ = [
     "tangent_at",
 ]
 
-_ENOUGH = 1e-11  # a Newton step below this, in scaled unknowns, is the last
-_NOISE = 1e-9  # where rounding keeps the steps from getting smaller, this will do
-_MOST = 8  # Newton steps from a good guess
-_TURN = 0.95  # least cosine between one tangent and the next
-_MOVED = 0.25  # of a step, from the tangent to the curve
-_STRAIGHT = 0.995  # from here on the next step may be longer
+_ENOUGH = 1e-11  # Size of the last Newton step, in scaled unknowns.
+_NOISE = 1e-9  # The same if rounding keeps the steps from getting smaller.
+_MOST = 8  # Newton steps from a good guess.
+_TURN = 0.95  # Least cosine between one tangent and the next.
+_MOVED = 0.25  # Largest distance of the curve from the tangent, in steps.
+_STRAIGHT = 0.995  # Least cosine after which the next step may be longer.
 
 
 class CorrectorFailed(Exception):
@@ -195,6 +195,6 @@ def predictor_corrector_step(
         if turn < _TURN or np.linalg.norm(there.u - guess) > _MOVED * step:
             step *= 0.5
             continue
-        # Where the curve is nearly straight steps may grow.
+        # Steps may grow if the curve is nearly straight.
         return there, step, min(step * (1.5 if turn > _STRAIGHT else 1.0), longest)
     raise CorrectorFailed(reason)

@@ -16,10 +16,10 @@ from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["saddle_node_on"]
 
-_BESIDE = 1e-2  # of the fold along the branch of equilibria, from where it is located
-_NEAR = 0.5  # typical sizes between the fold and the slowest node of the cycle at most
-_GROWN = 1.2  # factor of the period over the places that are compared
-_AGREES = 1.3  # by this factor at most the square of the period times the distance changes
+_BESIDE = 1e-2  # Distance from the fold, along the branch of equilibria, where its location starts.
+_NEAR = 0.5  # Largest distance of the fold from the slowest node of the cycle, in typical sizes.
+_GROWN = 1.2  # Growth of the period over the places that are compared.
+_AGREES = 1.3  # Largest factor by which the square of the period times the distance changes.
 
 
 def saddle_node_on(branch: Branch) -> BifurcationPoint | None:

@@ -52,11 +52,11 @@ class PeriodicOrbitCurve(SolutionCurve):
     mirror : ndarray (r,)
         Signs, all of them +1 where there is no mirror.
     shift : ndarray (r,)
-        What is added at the end: turns of angles.
+        Turns of angles that are added at the end.
     reference, across : ndarray (m, r)
         The nodes of the reference orbit, and the weights of the nodes' distances from them.
     share : float
-        Of a forced model: after how many of the forcing's periods the orbit closes.
+        The number of the forcing's periods after which the orbit closes.
     loose : float
         Multiplies the tolerances of the runs.
     """
@@ -88,7 +88,7 @@ class PeriodicOrbitCurve(SolutionCurve):
 
     @property
     def symmetric(self) -> bool:
-        """Whether the orbit closes in the mirror, after half its period."""
+        """True if the orbit closes in the mirror, after half its period."""
         return bool((self.mirror < 0).any())
 
     def period(self, u: Floats) -> float:
@@ -123,7 +123,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         return rate
 
     def flight(self, u: Floats) -> SegmentEnds:
-        """Where the pieces end, with derivatives by the parameter."""
+        """Return the ends of the pieces, with derivatives by the parameter."""
         key = u.tobytes()
         if key not in self._last:
             spans = np.full(self.pieces, self.span(u) / self.pieces)
@@ -203,7 +203,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         scaled = self.flow.scaled(flight.by_state * turn[:, :, None])
         if self.flow.forcing is not None:
             return np.ascontiguousarray(scaled)
-        # Where one piece ends the next begins, in the same plane.
+        # The next piece begins at the end of this one, in the same plane.
         after = _planes(flight.rate * turn / size)
         before = np.roll(after, 1, axis=0)
         factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before

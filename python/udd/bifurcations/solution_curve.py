@@ -1,4 +1,4 @@
-"""What curves of equilibria and of cycles over a parameter have in common."""
+"""Curves of solutions over a parameter: the base of those of equilibria and of cycles."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class FoundList(list[Found]):
     Attributes
     ----------
     search : str
-        Where it searched and how, in a sentence: what it did not find may still exist.
+        A sentence about the extent and method of the search: other solutions may exist.
     """
 
     def __init__(self, found: Iterable[Found], search: str) -> None:
@@ -68,18 +68,18 @@ class Equilibrium(Drawable):
     state : ndarray, shape (dim,)
         Angles that nothing depends on are 0; they turn at their constant rates.
     eigenvalues : ndarray of complex, shape (r,)
-        Of the rates' derivative by the components that the rates depend on; largest real part first.
+        Those of the rates' derivative by the components that the rates depend on; largest real part first.
     kind : str
-        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node", "unstable focus"; "centre"
-        where small swings neither grow nor decay; "degenerate" if it is a multiple root of the rates, "not
-        isolated" if it lies on a curve or surface of equilibria.
+        "stable focus", "stable node", "saddle", "saddle-focus", "unstable node", "unstable focus", or
+        "centre" if small swings neither grow nor decay. It is "degenerate" for a multiple root of the rates,
+        "not isolated" for a point of a curve or surface of equilibria.
     residual : float
-        What is left of the rates, in typical sizes per typical time.
+        The largest rate, in typical sizes per typical time.
     lyapunov_coefficient : float
-        The first Lyapunov coefficient of the complex pair nearest to the imaginary axis, NaN where there is
-        none: where the pair crosses the axis, a Hopf bifurcation is supercritical if it is negative.
+        The first Lyapunov coefficient of the complex pair nearest to the imaginary axis, NaN without a pair.
+        If the pair crosses the axis, the Hopf bifurcation is supercritical if the coefficient is negative.
     isolated : bool
-        Whether no other equilibria lie arbitrarily near.
+        True if no other equilibria lie arbitrarily near.
     """
 
     model: Model
@@ -92,7 +92,7 @@ class Equilibrium(Drawable):
 
     @property
     def stable(self) -> bool:
-        """Whether all eigenvalues have negative real parts."""
+        """True if all eigenvalues have negative real parts."""
         return bool((self.eigenvalues.real < 0).all())
 
     def __repr__(self) -> str:
@@ -118,7 +118,7 @@ class PeriodicOrbit(Drawable):
         The Floquet multipliers over the period, largest first; the one along the flow, 1, is left out. A
         forced model has those of the stroboscopic map, shape (r,).
     symmetric : bool
-        Whether it is its own image under the model's symmetry, half a period later.
+        True if it is its own image under the model's symmetry, half a period later.
     nodes : ndarray, shape (m, dim)
         States on it at equal distances of time, from `state` on; of a symmetric one over half the period.
     residual : float
@@ -136,7 +136,7 @@ class PeriodicOrbit(Drawable):
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle, and not on it but for rounding."""
+        """True if all multipliers are inside the unit circle, and not on it but for rounding."""
         return bool((np.abs(self.multipliers) < 1.0 - _ON).all())
 
     @cached_property
@@ -149,7 +149,7 @@ class PeriodicOrbit(Drawable):
 
     @property
     def neutral(self) -> bool:
-        """Whether no multiplier is outside the unit circle, and one on it but for rounding."""
+        """True if no multiplier is outside the unit circle, and one on it but for rounding."""
         return not self.stable and bool((np.abs(self.multipliers) <= 1.0 + _ON).all())
 
     @cached_property

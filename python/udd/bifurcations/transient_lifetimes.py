@@ -42,7 +42,7 @@ class Lifetimes(Drawable):
     mean : float
         The mean lifetime, if the motion forgets how old it is: infinite where none settled.
     standard_error : float
-        Of the mean: divided by the square root of the number that settled.
+        That of the mean: the mean divided by the square root of the number that settled.
     """
 
     time: Floats
@@ -114,7 +114,7 @@ def lifetimes(
 
     Examples
     --------
-    The chaotic motion beside the stable rotation of the damped equations:
+    The chaotic motion that coexists with the stable rotation of the damped equations:
 
     >>> import numpy as np
     >>> import udd
