@@ -12,7 +12,7 @@ from browser_for_tests import SIZES, Opened, until
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
 
-#: What is clicked to come to each screen; tabs are in the address.
+#: The buttons that lead to each screen; tabs are in the address.
 CLICKS = {
     **dict.fromkeys(("section", "diagram", "energy", "series", "what"), ()),
     "film": ("#to-film",),

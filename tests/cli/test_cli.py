@@ -848,3 +848,15 @@ def test_the_length_of_a_bob_in_pixels_is_asked_for(tmp_path: Path, capsys) -> N
     np.savetxt(tmp_path / "bob.csv", bob, delimiter=",", header="t,x,y", comments="")
     assert main(["fit", str(tmp_path / "bob.csv")]) == 1
     assert "say its length in m with --pendulum LENGTH" in capsys.readouterr().err
+
+
+def test_a_help_imports_no_numbers() -> None:
+    """Numpy and the metadata of packages take four times as long as all else of a help."""
+    code = (
+        "import sys; from udd.cli.parser import make_parser; make_parser().format_help(); "
+        "print([name for name in ('numpy', 'scipy', 'importlib.metadata') if name in sys.modules])"
+    )
+    # -S: site-packages may load the metadata of packages themselves.
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    answer = subprocess.run([sys.executable, "-S", "-c", code], env=environment, capture_output=True, text=True)
+    assert answer.stdout == "[]\n", answer.stderr

@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 
 def as_json(data: Any) -> str:
     """JSON that every reader takes: what is not finite is null."""
@@ -17,6 +15,8 @@ def as_json(data: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
+    import numpy as np  # a help that prints no data must not wait for it
+
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray | np.generic):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
-
 
 def version_of(name: str) -> str:
     """A package's version."""
+    from importlib.metadata import PackageNotFoundError, version  # takes longer than all else of a help
+
     try:
         return version(name)
     except PackageNotFoundError:

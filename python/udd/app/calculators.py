@@ -37,7 +37,7 @@ class Calculators:
     budget : limits.Budget
         How many there may be and what a question may take.
     kind : str
-        What they are asked: ``"runs"``, ``"sections"`` or ``"maps"``, for which they prepare.
+        The questions for which they prepare: ``"runs"``, ``"sections"`` or ``"maps"``.
     """
 
     def __init__(self, budget: limits.Budget, kind: str = "runs") -> None:

@@ -74,6 +74,17 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, message)
 
 
+class _Version(argparse.Action):
+    """The option that prints the version, which is looked up only then."""
+
+    def __init__(self, option_strings: list[str], dest: str, help: str | None = None) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=argparse.SUPPRESS, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        print(f"udd {version_of('udd')}")
+        parser.exit()
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     parser = Parser(
@@ -82,7 +93,7 @@ def make_parser() -> argparse.ArgumentParser:
         description="The laboratory of the upward-driven disk: film it, fit it, find what the model lacks.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"udd {version_of('udd')}")
+    parser.add_argument("--version", action=_Version, help="show program's version number and exit")
     # The groups below list the commands.
     commands = parser.add_subparsers(
         metavar="COMMAND", required=True, help=argparse.SUPPRESS, parser_class=Parser, prog="udd"

@@ -22,18 +22,10 @@ _WORDS: dict[str, tuple[str, ...]] = {
 }
 #: Words of headings of what drives a machine.
 _DRIVERS = (
-    "torque",
-    "voltage",
-    "current",
-    "force",
-    "input",
-    "drive",
-    "motor",
-    "drehmoment",
-    "spannung",
-    "strom",
+    *("torque", "voltage", "current", "force", "input", "drive", "motor"),
+    *("drehmoment", "spannung", "strom", "kraft", "antrieb", "eingang"),
+    *("koppel", "spanning", "stroom", "kracht", "aandrijving", "ingang"),
 )
-_DRIVERS += ("kraft", "antrieb", "eingang", "koppel", "spanning", "stroom", "kracht", "aandrijving", "ingang")
 _LETTERS = {"t": "t", "y": "Y", "z": "Z"}
 
 
