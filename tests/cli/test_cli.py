@@ -858,5 +858,7 @@ def test_a_help_imports_no_numbers() -> None:
     )
     # -S: site-packages may load the metadata of packages themselves.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    answer = subprocess.run([sys.executable, "-S", "-c", code], env=environment, capture_output=True, text=True)
+    answer = subprocess.run(
+        [sys.executable, "-S", "-c", code], env=environment, capture_output=True, text=True
+    )
     assert answer.stdout == "[]\n", answer.stderr

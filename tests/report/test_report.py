@@ -8,7 +8,7 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -367,3 +367,22 @@ def test_errors_of_the_known_model_contain_what_it_lacks() -> None:
     unit = {"m/s": 1.0, "cm/s": 1e2, "mm/s": 1e3}[str(row["unit"])]
     assert error == pytest.approx(unit * alone.errors["W"], rel=0.2)
     assert alone.errors["W"] > 20 * found.baseline.errors["W"]
+
+
+@pytest.mark.parametrize(
+    ("square", "error", "said"),
+    [
+        (0.01**2 / 24, 1e-7, "10.00(12)"),  # open for 10 ms
+        (0.0, 0.01**2 / 48, "at most 10"),
+        (-1e-5, 1e-6, "at most 6.9"),
+    ],
+)
+def test_the_shutter_s_row_is_a_time(square: float, error: float, said: str) -> None:
+    from types import SimpleNamespace
+
+    from udd.report import tables
+
+    fit: Any = SimpleNamespace(parameters={"shutter": square}, errors={"shutter": error})
+    assert tables._open_time(fit, "shutter") == said
+    row = next(row for row in tables.camera(discovered.disk()) if row["name"] == "shutter")
+    assert row["unit"] == "ms" and row["meaning"] == "time for which the shutter is open"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -61,6 +62,17 @@ def _rows(
     baseline = loosest(discovery.baseline).with_diagnostics() if discovery.effects else discovery.baseline
     rows = []
     for name in filter(wanted, discovery.fit.parameters):
+        if _base(name) == "shutter":
+            rows.append(
+                {
+                    "name": wording.pretty("shutter"),
+                    "meaning": "time for which the shutter is open" + _of_film(name),
+                    "before": _open_time(baseline, name),
+                    "after": _open_time(discovery.fit, name),
+                    "unit": wording.pretty("ms"),
+                }
+            )
+            continue
         unit, factor = small_unit(unit_of[name]) if unit_of[name] else share
         rows.append(
             {
@@ -95,6 +107,17 @@ def _value(fit: Fit, name: str, factor: float) -> str:
     if name not in fit.parameters:
         return "–"
     return wording.with_error(factor * fit.parameters[name], factor * fit.errors[name])
+
+
+def _open_time(fit: Fit, name: str) -> str:
+    """Format the time for which the shutter is open [ms]; the fit has its square, divided by 24 [s^2]."""
+    if name not in fit.parameters:
+        return "–"
+    square, error = 24.0 * fit.parameters[name], 24.0 * fit.errors[name]
+    if square <= 2.0 * error:
+        return f"at most {1e3 * math.sqrt(max(square, 0.0) + 2.0 * error):.2g}"
+    time = math.sqrt(square)
+    return wording.with_error(1e3 * time, 1e3 * error / (2.0 * time))
 
 
 def _meaning(name: str, discovery: Discovery) -> str:
