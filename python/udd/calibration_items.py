@@ -27,9 +27,9 @@ class Item:
     what : str
         Short description.
     rows : tuple of str
-        Its rows in ``meta["calibration"]``; if empty, the row `name`.
+        Rows of the item in ``meta["calibration"]``. If empty, it is the row `name`.
     numbers : (float, float), optional
-        Allowed range, if a number may be given; else the item is only switched on and off.
+        Allowed range, if a number may be given. Otherwise the item is only switched on and off.
     unit : str
         Unit of that number.
     shown : (float, str)

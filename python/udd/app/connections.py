@@ -1,6 +1,6 @@
 """Limits on connections before any token was shown.
 
-uvicorn limits the idle time between two requests. It limits neither the time for the head of a request nor
+uvicorn limits the pause between two requests. It limits neither the time for the head of a request nor
 the number of connections.
 """
 

@@ -30,13 +30,13 @@ class Attractor:
     Attributes
     ----------
     kind : str
-        Of `KINDS`.
+        A member of `KINDS`.
     states : ndarray (k, dim)
-        The distinct points of a period, or all there are.
+        The distinct points of a period. An aperiodic attractor has all its points.
     points : ndarray (k, m)
         The same in the coordinates of comparison.
     duration : float
-        Of one period; NaN where there is none.
+        Time of a period. NaN if the attractor is aperiodic.
     """
 
     kind: str

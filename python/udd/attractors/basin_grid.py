@@ -68,7 +68,7 @@ def basins(
     model : Model
         The model.
     grid : mapping of str to array_like
-        One to three components of the state, usually two, with their increasing values at the start.
+        One to three components of the initial state, usually two. Their values increase.
     state0 : array_like, shape (dim,), optional
         The other components at the start; by default those of :func:`udd.lyapunov`.
     section : str, optional
@@ -84,11 +84,11 @@ def basins(
     t_max : float, optional
         The longest time for the first ``transient + n`` points; by default generous.
     **options
-        ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs; ``max_step``,
-        their longest step; ``threads`` (by default one per core); ``progress``, True
-        for a progress bar, False for none, or a function that gets the state of the work as a text (by
-        default a bar after 2 s in a terminal or a notebook); ``partial``, after Ctrl-C to return what there
-        is, with a warning, instead of raising it with the exception.
+        ``rtol`` (1e-9) and ``atol`` (1e-12) are the tolerances of the runs. ``max_step`` is their longest
+        step. ``threads`` is one per core by default. ``progress`` is True for a progress bar, False for
+        none, or a function that gets the state of the work as a text. By default a bar shows after 2 s in a
+        terminal or a notebook. With ``partial``, Ctrl-C returns the finished part with a warning, instead of
+        raising an exception.
 
     Returns
     -------

@@ -68,13 +68,13 @@ class UncertaintyExponent:
     Attributes
     ----------
     stride : ndarray of int (k,)
-        Distances, in steps of the grid.
+        Distances between the states of a pair, in steps of the grid.
     fraction : ndarray (k,)
-        The share of pairs (along the axes) whose ends differ.
+        Share of pairs along the axes whose ends differ. The pairs have the distance `stride`.
     exponent, standard_error : float
-        Of fraction ~ stride^exponent, NaN if it cannot be determined.
+        Exponent in fraction ~ stride^exponent. NaN if it cannot be determined.
     fitted : ndarray of bool (k,)
-        Which distances the exponent is from.
+        True for the distances that the exponent is fitted to.
     """
 
     stride: NDArray[np.int32]

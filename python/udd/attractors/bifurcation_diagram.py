@@ -77,39 +77,39 @@ def bifurcation(
     Parameters
     ----------
     model : Model
-        The model; `parameter` is varied in it.
+        The model. Its `parameter` is varied.
     parameter : str
-        One of ``model.parameters``; an effect's as ``"effect.name"``.
+        One of ``model.parameters``. That of an effect is ``"effect.name"``.
     values : array_like, shape (v,)
-        Its values, increasing.
+        Increasing values of the parameter.
     section : str, optional
-        The surface, as :func:`udd.poincare` takes it; by default ``"z"`` (``"Z"``, ``"theta"``).
+        The surface, as :func:`udd.poincare` takes it. The default is ``"z"`` (``"Z"``, ``"theta"``).
     direction : {"up", "down", "both"}, optional
-        In which direction it is crossed; by default upward.
+        Direction of the crossings that count. The default is upward.
     n : int
         How many points are kept, at least 12. Periods up to a third of this are recognised.
     transient : int
-        How many points are left out before.
+        Number of points that are left out first.
     initial_states : array_like, shape (s, dim) or (dim,), optional
-        Initial states; by default that of :func:`udd.lyapunov`.
+        Initial states. The default is that of :func:`udd.lyapunov`.
     path : {"independent", "up", "down", "both"}
-        Whether every value begins at the initial states, or where the one before (after) it ended.
+        Every value begins at the initial states, or at the end of the value before (after) it.
     component : str or sequence of str, optional
-        Which components of the state are kept; by default all.
+        Components of the state that are kept. By default all are.
     attractors : bool
-        Whether to tell periods and attractors; otherwise the points and outcomes are all there is.
+        True to classify attractors and count periods. If False, the result has points and outcomes only.
     t_max : float, optional
-        The longest time for the first ``transient + n`` points; by default generous.
+        The longest time for the first ``transient + n`` points. The default is generous.
     **options
-        ``max_extension`` (64): what still settles is followed further, up to this many times ``transient +
-        n`` points; ``perturbation`` (1e-4): what is added to a state that is carried over, relative to the
-        size of the motion, lest it stay on an orbit that is no longer stable; ``match_distance`` (0.25):
-        how far an attractor's points may move, on average and relative to the size of the motion, from one
-        value to the next; ``rtol`` (1e-9) and ``atol`` (1e-12), the tolerances of the runs;
-        ``max_step``, their longest step; ``threads`` (by default one per core); ``progress``, True
-        for a progress bar, False for none, or a function that gets the state of the work as a text (by
-        default a bar after 2 s in a terminal or a notebook); ``partial``, after Ctrl-C to return what there
-        is, with a warning, instead of raising it with the exception.
+        ``max_extension`` (64): a motion that still settles is followed further, up to this many times
+        ``transient + n`` points. ``perturbation`` (1e-4) is added to a state that is carried over, so that it
+        leaves an orbit that became unstable. It is relative to the size of the motion.
+        ``match_distance`` (0.25) is the largest mean distance of an attractor's points from one value to the
+        next, relative to the size of the motion. ``rtol`` (1e-9) and ``atol`` (1e-12) are the tolerances of
+        the runs. ``max_step`` is their longest step. ``threads`` is one per core by default.
+        ``progress`` is True for a progress bar, False for none, or a function that
+        gets the state of the work as a text. By default a bar shows after 2 s in a terminal or a notebook.
+        With ``partial``, Ctrl-C returns the finished part with a warning, instead of raising an exception.
 
     Returns
     -------
@@ -118,10 +118,11 @@ def bifurcation(
 
         - the components of the state at the section, NaN where there are fewer points;
         - ``outcome``: how each job ended;
-        - ``kind``: ``flag_meanings`` names each number: equilibrium, rotating state, cycle,
-          torus, chaos; aperiodic where the exponents leave that open; left; none without a verdict;
-        - ``period``: the number of distinct points (the rounds of a cycle, 1 at rest), 0 not periodic, -1
-          without a verdict;
+        - ``kind``: a number with a name in ``flag_meanings``: equilibrium, rotating state, cycle, torus,
+          chaos, left, or none (no verdict). It is aperiodic if the exponents do not distinguish torus and
+          chaos;
+        - ``period``: the number of distinct points (the rounds of a cycle, 1 at rest). It is 0 if the motion
+          is not periodic, and -1 without a verdict;
         - ``period_time``: how long a period takes;
         - ``attractor``: a label from 1 on, 0 where there is none; attractors of neighbouring values have the
           same one where the points hardly move;

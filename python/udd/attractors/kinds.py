@@ -21,10 +21,10 @@ MOTIONS = ("none", "equilibrium", "rotating state", "cycle", "torus", "chaos", "
 wheels, or at infinity."""
 
 _LEFT = [OUTCOMES.index("ejected"), OUTCOMES.index("escaped")]
-_PARTS = 20.0  # a distance that grows by exp of this does so in chaos
-_STAYS = 3.0  # one that changes by less than exp of this does not change
-_SPANS = (0.4, 4.0)  # of the time of the section points: for most chaos, and for the rest
-_TURNS = 1e-6  # typical sizes per typical time: what is slower does not turn
+_PARTS = 20.0  # A distance that grows by exp of this shows chaos.
+_STAYS = 3.0  # A distance that changes by less than exp of this does not change.
+_SPANS = (0.4, 4.0)  # Shares of the time of the section points. The first is enough for most chaos.
+_TURNS = 1e-6  # Typical sizes per typical time. A slower state does not rotate.
 
 
 def kinds_of(
@@ -37,8 +37,8 @@ def kinds_of(
 ) -> NDArray[np.int8]:
     """Return the place in `MOTIONS` of each job.
 
-    A motion that does not come back is chaos if neighbouring orbits diverge, a torus if two directions
-    neither grow nor shrink, and a cycle (of more rounds than can be counted) if one direction does.
+    A motion that does not come back is chaos if neighbouring orbits diverge. It is a torus if two directions
+    neither grow nor shrink. It is a cycle, of more rounds than can be counted, if a single direction does so.
     """
     kind = np.zeros(len(values), dtype=np.int8)
     known = decided(crossings, verdicts)

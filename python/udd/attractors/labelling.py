@@ -22,15 +22,15 @@ class DiagramLabels:
     Attributes
     ----------
     label : ndarray of int (jobs,)
-        From 1 on; 0 where there is no attractor.
+        Label from 1 on. It is 0 if there is no attractor.
     symmetric : ndarray of int (jobs,)
-        1 own mirror image, 0 not, -1 no symmetry or no attractor.
+        1 if the attractor is its own mirror image, 0 if not. It is -1 without a symmetry or an attractor.
     duration : ndarray (jobs,)
-        Of a period.
+        Time of a period.
     differ : ndarray of bool (values,)
-        Whether the ways up and down end on different attractors, mirror images being the same.
+        True if the ways up and down end on different attractors. Mirror images count as the same.
     unknown : ndarray of bool (values,)
-        Whether there is a way without an attractor.
+        True if one of the ways ends without an attractor.
     """
 
     label: NDArray[np.int32]

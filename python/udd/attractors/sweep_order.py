@@ -55,13 +55,15 @@ def run_in_order(
     work : callable
         Takes jobs and their initial states, and fills `crossings`.
     crossings : Crossings
+        Result of all jobs.
     begin : ndarray (starts, dim)
+        Initial states. Each path begins at all of them.
     places : ndarray (paths, starts, values)
-        The number of each job.
+        Number of each job.
     names : tuple of str
-        The names of the paths.
+        Names of the paths.
     added : ndarray (dim,)
-        The perturbation of a state that is carried over.
+        Perturbation of a state that is carried over. It leads away from an unstable orbit.
     each : int
         Section points of a job.
     tell : callable

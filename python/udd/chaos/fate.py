@@ -26,15 +26,15 @@ __all__ = ["Fate", "Orbit"]
 
 _Floats = NDArray[np.float64]
 
-_FOLLOWED = 36_000  # section points that chaos is followed for: the longest such look has half of them
-_LATE = 4  # times that a motion that nearly comes back is looked at again
-_POINTS = 600  # section points in which a periodic motion shows itself
-_RETURNS = 20.0  # mean times between section points that show how large a motion is
+_FOLLOWED = 36_000  # Section points for which chaos is followed. The longest look has half of them.
+_LATE = 4  # Further looks at a motion that nearly comes back.
+_POINTS = 600  # Section points in which a periodic motion is recognised.
+_RETURNS = 20.0  # Mean times between section points that show the size of a motion.
 _SAMPLES = 2000
-_NOISE = 100.0  # times the tolerance: a component that moves less rests
-_GROWS = 1.3  # by this factor, each time that the time doubles, unbounded motions grow
+_NOISE = 100.0  # Times the tolerance: a component that moves less is at rest.
+_GROWS = 1.3  # Growth of an unbounded motion each time that the time doubles.
 _DOUBLINGS = 8
-_FAR = 1e12  # times its first size: a motion that grew so far is unbounded
+_FAR = 1e12  # Times its first size: a motion that grew so far is unbounded.
 
 
 @dataclass(frozen=True)

@@ -94,23 +94,23 @@ def lyapunov(
         Drive of the undamped diffusionless Lorenz equations, or any model. Arrays of any shape are spread
         over all cores.
     parameters : mapping of str to array_like, optional
-        Other values of some of the model's parameters, of shapes that broadcast with one another and with
-        `w`; the result has their shape.
+        Other values of some of the model's parameters. Their shapes broadcast with each other and with `w`.
+        The result has the common shape.
     t : float, optional
-        Time to run at most; by default 1e5, or 25000 s for a model with units.
+        Longest time of the run. The default is 1e5, or 25000 s for a model with units.
     tol : float, optional
-        The run ends once the standard error is down to this; by default 2e-3 per unit of time, or 8e-3 /s.
+        The run ends when the standard error is below this. The default is 2e-3 per unit of time, or 8e-3 /s.
     transient : float, optional
         Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
         Should the first half of what follows disagree with the second, it is left out too.
     state0 : array_like, shape (dim,), optional
-        Initial state. Where several attractors coexist it decides between them.
+        Initial state. If several attractors coexist, it decides between them.
     rtol, atol : float
-        Tolerances of the run.
+        Relative and absolute tolerance of the run. See :func:`udd.simulate`.
     max_step : float, optional
         The longest step, as for :func:`udd.simulate`.
     threads : int, optional
-        How many threads to use, by default one per core. No bit of the result depends on it.
+        Number of threads. By default there is one per core, and no bit of the result depends on it.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.
@@ -120,11 +120,11 @@ def lyapunov(
     Returns
     -------
     exponent : float, or ndarray of the shape of `w` and the `parameters`
-        Per unit of time (1/s for a model with units).
+        Rate per unit of time. The unit is 1/s for a model with units.
     standard_error : float or ndarray
-        Where `with_error` is set: from the scatter of the means over blocks of the run. Blocks of a short run
-        are not long beside the motion's memory, and the error is on the large side: by a half at t = 3000 and
-        w = 1.
+        Only if `with_error` is set. It follows from the scatter of the means over blocks of the run. Blocks
+        of a short run are hardly longer than the memory of the motion. Then the error is too large: by a half
+        at t = 3000 and w = 1.
 
     Raises
     ------

@@ -48,24 +48,25 @@ class Section(Drawable):
     Attributes
     ----------
     t : ndarray, shape (..., n)
-        When. One orbit that ended before n crossings has fewer; of many orbits such rows end in NaN.
+        Times of the crossings. An orbit that ended early has fewer than n. With many orbits such rows end in
+        NaN.
     state : ndarray, shape (..., n, dim)
-        Where, in the order of ``model.state_names``.
+        States at the crossings, in the order of ``model.state_names``.
     which : ndarray of int, shape (..., n)
-        Of which surface, counted from 0; -1 where there is none.
+        Number of the surface, counted from 0. It is -1 if there is no crossing.
     section : tuple of str
-        The surfaces: expressions that are zero there.
+        The surfaces. Each is an expression that is zero there.
     direction : tuple of {"up", "down", "both"}
-        In which direction of the expression they are crossed.
+        Direction in which each expression changes.
     found : int, or ndarray of int, shape (...)
-        How many crossings there are.
+        Number of crossings.
     residual : float, or ndarray, shape (...)
         The largest absolute value of the expressions at the points.
     outcome : str, or ndarray of str, shape (...)
-        ``"finished"``, or why there are fewer crossings: ``"ejected"``, ``"time ran out"``, ``"escaped"`` (to
-        infinity), ``"failed"``, ``"chattering"``, ``"interrupted"``.
+        ``"finished"``, or the reason for fewer crossings. Reasons are ``"ejected"``, ``"time ran out"``,
+        ``"escaped"`` (to infinity), ``"failed"``, ``"chattering"`` and ``"interrupted"``.
     end : ndarray, shape (..., dim)
-        The last state: the last crossing where it finished.
+        The last state. It is the last crossing if the orbit finished.
     t_end : float, or ndarray, shape (...)
         The time of that.
     model : Model
@@ -263,34 +264,33 @@ def poincare(
     ----------
     model : Model
     section : str or list of str, optional
-        Surfaces, each an expression that is zero there, or an equation, of the state's components
-        (``"z"``, ``"omega = y"``), their rates (``"z'"``), the time ``t``, the parameters and numbers, with
-        ``+ - * / ^``, ``pi`` and the functions that :func:`udd.effects.formula` names. Or a name:
+        Surfaces. Each is an expression that is zero there, or an equation. It may contain components of the
+        state (``"z"``, ``"omega = y"``), their rates (``"z'"``), the time ``t``, parameters and numbers.
+        Operators are ``+ - * / ^``. Functions are those of :func:`udd.effects.formula`. Or a name:
         ``"maxima of z"``, ``"minima of z"``, ``"turning points of z"`` of any component, ``"reversal"``
         (the angular velocity is zero). By default z = 0 of the DLE, Z = 0 of a disk, theta = 0 of a
         pendulum, and the maxima of the first state of a user's own model.
     n : int
-        How many crossings are wanted.
+        Number of crossings of each orbit.
     state0 : array_like, shape (..., dim), optional
         Initial states, at time 0. An orbit that starts on the surface does not cross it there.
     parameters : mapping of str to array_like, optional
-        Other values of some of the model's parameters, of shapes that broadcast with one another and with
-        the leading axes of `state0`; the result has these axes.
+        Other values of some of the model's parameters. Their shapes broadcast with each other and with the
+        leading axes of `state0`. The result has these axes.
     direction : {"up", "down", "both"} or list of these, optional
-        Whether crossings count where the expression rises, falls, or both. By default ``"up"``; for turning
-        points and reversals ``"both"``.
+        Direction of the crossings that count: the expression rises, falls, or both. The default is ``"up"``,
+        and ``"both"`` for turning points and reversals.
     transient : int
-        How many crossings are left out first.
+        Number of crossings that are left out first.
     t_max : float, optional
-        The time at which an orbit ends in any case; by default 100 typical times of the motion for every
+        Time at which an orbit ends in any case. The default is 100 typical times of the motion for every
         crossing.
     **options
-        ``rtol`` (1e-9) and ``atol`` (1e-12, less for starts below 1e-3), the tolerances of the run;
-        ``max_step``, its longest step; ``threads`` (by default one per core; the result does not depend on
-        it); ``progress``, True
-        for a progress bar, False for none, or a function that gets the state of the work as a text (by
-        default a bar after 2 s in a terminal or a notebook); ``partial``, after Ctrl-C to return what there
-        is, with a warning, instead of raising it with the exception.
+        ``rtol`` (1e-9) and ``atol`` (1e-12, less for starts below 1e-3) are the tolerances of the run.
+        ``max_step`` is its longest step. ``threads`` is one per core by default, and the result does not
+        depend on it. ``progress`` is True for a progress bar, False for none, or a function that
+        gets the state of the work as a text. By default a bar shows after 2 s in a terminal or a notebook.
+        With ``partial``, Ctrl-C returns the finished part with a warning, instead of raising an exception.
 
     Returns
     -------

@@ -23,11 +23,11 @@ class Tightness:
     Attributes
     ----------
     noise : float
-        What the integration's own errors make of a point that comes back exactly.
+        Distance by which integration errors move a point that comes back exactly.
     settled : float
-        How far a periodic orbit's points may still be from where they are going.
+        Largest distance of a periodic orbit's points from their limits. A larger one means a transient.
     same : float
-        How near the points of two records of one periodic orbit are.
+        Largest distance between the points of two records of the same periodic orbit.
     """
 
     noise: float
@@ -54,8 +54,8 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
     Returns
     -------
     ndarray (jobs,)
-        The period, at most a third of n; 0 where the points do not come back; -1 where they nearly do but
-        still move: a transient that dies out, or an unstable orbit that is being left.
+        The period, at most a third of n. It is 0 if the points do not come back. It is -1 if they nearly do
+        but still move: a transient that dies out, or an unstable orbit that is being left.
 
     Notes
     -----

@@ -17,15 +17,15 @@ __all__ = ["Equilibrium", "RestTest", "equilibrium_near"]
 
 _Floats = NDArray[np.float64]
 
-_STEPS = 100  # of Newton's method
-_SAME = 1e-10  # a step of Newton's method below this part of the state, or of all steps, is the last
-_REST = 1e-6  # of the rates at first may be left,
-_ROUNDING = 1e-14  # of the largest component: no step is more accurate
-_TINY = 1e-290  # near the smallest numbers nothing is relative
-_ZERO = 1e-8  # real parts below this part of the largest eigenvalue are zero
-_SPANS = 10.0  # times that of the slowest decay an orbit is followed,
-_LEAVES = 40.0  # and times that of the slowest growth: rounding is large then, unless a symmetry forbids it
-_LEFT = 0.1  # of the largest distance may be left then
+_STEPS = 100  # Iterations of Newton's method.
+_SAME = 1e-10  # An iteration below this part of the state, or of all steps, is the last.
+_REST = 1e-6  # Share of the first rates that may remain.
+_ROUNDING = 1e-14  # Share of the largest component: no step is more accurate.
+_TINY = 1e-290  # Relative errors mean nothing near the smallest numbers.
+_ZERO = 1e-8  # Real parts below this part of the largest eigenvalue are zero.
+_SPANS = 10.0  # Times of the slowest decay for which an orbit is followed.
+_LEAVES = 40.0  # The same of the slowest growth: rounding is large then, if no symmetry forbids it.
+_LEFT = 0.1  # Share of the largest distance that may remain then.
 _SAMPLES = 200
 _TIMES = (0.0, 0.7371)  # in typical times: an equilibrium of rates that depend on time is there at both
 
@@ -84,10 +84,11 @@ class RestTest:
     ----------
     model : Model
     kept : ndarray of int (r,)
+        Components of an equilibrium. The others are angles that may turn.
     clock : float
-        A typical time, used only if the rates depend on time.
+        A typical time. It is used only if the rates depend on time.
     longest : float
-        An orbit is followed for no longer than this.
+        The longest time for which an orbit is followed.
     rtol, atol : float
     """
 

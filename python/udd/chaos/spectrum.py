@@ -37,13 +37,13 @@ __all__ = ["Covariant", "Spectrum", "covariant_vectors", "lyapunov_spectrum"]
 
 _Floats = NDArray[np.float64]
 
-_SIGMAS = 4.0  # an exponent this many standard errors from zero is not zero
-_POWER = 2.0  # neighbours that part no faster than this power of the time are no chaos
-_STAYS = 1e-3  # an exponent that is smaller than this, per typical time, is as good as zero
-_GROWTH = 3.0  # a distance that changes by less than exp of this does not change
-_LONG = 1e3  # mean times between section points: a run that shows what does not settle
-_PERIODS = 10.0  # a run of fewer periods does not show which exponent of a cycle is zero
-_FAR = 1e6  # times its start, or from 0: a run that fails there has gone to infinity
+_SIGMAS = 4.0  # An exponent this many standard errors from zero is not zero.
+_POWER = 2.0  # Neighbours that separate no faster than this power of the time are no chaos.
+_STAYS = 1e-3  # A smaller exponent, per typical time, counts as zero.
+_GROWTH = 3.0  # A distance that changes by less than exp of this does not change.
+_LONG = 1e3  # Mean times between section points in a run that shows aperiodic motion.
+_PERIODS = 10.0  # A shorter run does not show which exponent of a cycle is zero.
+_FAR = 1e6  # Times its start, or from 0: a run that fails there has gone to infinity.
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +53,12 @@ class Spectrum(Drawable):
     Attributes
     ----------
     exponents : ndarray, shape (dim,)
-        Largest first, per unit of time (1/s for a model with units); -inf where a contact sticks.
+        Largest first, per unit of time (1/s for a model with units). It is -inf if a contact sticks.
     standard_errors : ndarray, shape (dim,)
-        From the scatter of the means over blocks of the run.
+        Standard errors from the scatter of the means over blocks of the run.
     dimension : float
-        The Kaplan-Yorke dimension: how many exponents, the last one in part, add up to zero; NaN of an orbit
-        that escapes.
+        The Kaplan-Yorke dimension: the number of exponents, the last one in part, that add up to zero. NaN of
+        an orbit that escapes.
     verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "escapes", "undecided"}
         What the orbit does in the end, wherever its origin is and however large it is. At an equilibrium the
         orbit comes nearer to it for several times its slowest decay. A periodic orbit comes back, modulo
@@ -68,23 +68,24 @@ class Spectrum(Drawable):
         in a plane there is none. A torus (quasiperiodic motion) has two exponents or more that are smaller
         than 1e-3 per typical time, and none above. Time counts as a direction if the rates depend on it.
     period : float
-        The period of a periodic orbit that was seen to come back, else NaN.
+        Period of a periodic orbit. NaN if the orbit was not seen to come back.
     invariants : dict of str to float
-        What must vanish on every bounded orbit, such as ``"<z>"`` or the sum of the exponents less the mean
-        divergence: how far the run is from it. Averages of chaotic motion scatter like the exponents do.
+        Quantities that are zero on every bounded orbit, with their values in this run. Examples are ``"<z>"``
+        and the sum of the exponents less the mean divergence. Averages of chaotic motion scatter like the
+        exponents do.
     t : float
-        The time that the averages cover, after the transient.
+        Time that the averages cover. It begins after the transient.
     transient : float
-        How long the orbit at most took to settle on what it ends on, where the first averages were those of
-        another motion on the way there, such as chaos that lasts long but not for ever; else 0.
+        Upper limit of the time that the orbit took to settle. It is 0 unless the first averages belonged to
+        another motion, such as transient chaos.
     end : ndarray, shape (dim,)
         The last state.
     converged : bool
-        Whether the largest exponent's standard error met the tolerance, and the motion has settled.
+        True if the standard error of the largest exponent met the tolerance, and the motion has settled.
     model : Model
         What was run.
     section : Section or None
-        Where the orbit crosses a surface from its last state on, if that was asked for.
+        Crossings of a surface after the last state. None if no section was asked for.
 
     See Also
     --------
@@ -148,9 +149,9 @@ def lyapunov_spectrum(
     w : float or Model
         Drive of the undamped diffusionless Lorenz equations, or any model.
     t : float, optional
-        Time to run at most; by default 2e5, or 5e4 s for a model with units.
+        Longest time of the run. The default is 2e5, or 5e4 s for a model with units.
     tol : float, optional
-        The run ends once the standard error of the largest exponent is down to this; by default 1e-3 per
+        The run ends when the standard error of the largest exponent is below this. The default is 1e-3 per
         unit of time, or 4e-3 /s.
     transient : float, optional
         Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
@@ -159,8 +160,8 @@ def lyapunov_spectrum(
         Initial state. Where several attractors coexist it decides between them.
     section : str or list of str, optional
         A surface, or several, as in :func:`udd.poincare`, whose crossings are wanted too. The result's
-        `section` then holds the next 600 of them: those of the orbit's continuation from the run's last
-        state, `end`, which has the transient behind it.
+        `section` then holds the next 600 of them. They continue the orbit from the last state of the run,
+        `end`, after the transient.
     rtol, atol : float
         Tolerances of the run.
     max_step : float, optional
@@ -423,15 +424,15 @@ class Covariant(Drawable, OneLine):
     Attributes
     ----------
     t : ndarray, shape (n + 1,)
-        Times.
+        Times. They are equally spaced.
     state : ndarray, shape (n + 1, dim)
-        States.
+        States at these times.
     vectors : ndarray, shape (n + 1, dim, dim)
-        ``vectors[k, i]`` is the unit vector i at time k: it grows at the rate of exponent i, forwards and
+        ``vectors[k, i]`` is the unit vector i at time k. It grows at the rate of exponent i, forwards and
         backwards in time.
     local_exponents : ndarray, shape (n, dim)
-        The mean growth rates of the orthonormal frame in each interval: the exponents of finite time,
-        whose mean over all intervals is the spectrum.
+        Mean growth rates of the orthonormal frame in each interval: the exponents of finite time. Their mean
+        over all intervals is the spectrum.
 
     See Also
     --------
@@ -471,9 +472,9 @@ def covariant_vectors(
     model : Model
         :class:`udd.DLE`, :class:`udd.Disk` or :class:`udd.Pendulum`.
     n : int
-        How many intervals are wanted.
+        Number of intervals.
     dt : float, optional
-        Their length, by default 0.5, or 0.125 s.
+        Length of an interval. The default is 0.5, or 0.125 s for a model with units.
     state0 : array_like, shape (dim,), optional
         Initial state.
     transient : float, optional

@@ -41,9 +41,9 @@ def demo(
     Parameters
     ----------
     out : path
-        Folder to write to; it is created if needed.
+        Folder to write to. It is created if needed.
     null : bool
-        Take the film of a disk without any effect.
+        If True, use the film of a disk without any effect. Nothing should be found in it.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.

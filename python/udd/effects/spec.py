@@ -30,9 +30,9 @@ class Parameter:
     Attributes
     ----------
     name, unit : str
-        The unit is SI, empty where dimensionless.
+        Name, and SI unit. The unit is empty if the parameter is dimensionless.
     default : float
-        The value if none is given.
+        Value if none is given.
     range : tuple of float
         The physically sensible range.
     role : str
@@ -105,9 +105,9 @@ class Spec:
     Attributes
     ----------
     name : str
-        Its constructor's name in this module.
+        Name of its constructor in this module.
     title, equation, meaning : str
-        Its name for a reader, its formula, and its physical meaning.
+        Name for a reader, formula, and physical meaning. They are plain text.
     bodies : tuple of str
         Bodies that it can act on: ``"disk"``, ``"pendulum"``.
     slots : tuple of str
@@ -278,7 +278,7 @@ class Effect:
         Parameter values in the library's order. Amplitudes may be outside their physical range, as during a
         fit; shapes and frequencies may not.
     momentum : str, optional
-        ``"consistent"`` or ``"constraint"``, if the effect has the choice; default: its first.
+        ``"consistent"`` or ``"constraint"``, if the effect has the choice. The default is its first.
     treatment : str, optional
         ``"smoothed"``, ``"set-valued"``, ``"karnopp"`` or ``"lugre"`` for dry friction; default: the first.
         See :class:`Spec`.

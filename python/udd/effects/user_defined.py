@@ -141,7 +141,7 @@ class SurfaceSpec(FormulaSpec):
     coordinates : tuple of str
         Coordinates of the surface.
     low, high : tuple of float
-        Its ends along each.
+        Ends of the surface. There is a pair for each coordinate.
     shape : tuple of int
         Number of coefficients along each coordinate.
     periodic : bool
@@ -189,23 +189,23 @@ def formula(
     Parameters
     ----------
     slot : {"torque", "friction", "lateral", "vertical"}, the rate of a state, or a force
-        The equation that the formula is added to: the torque [m^2/s^2], the friction coefficient k [m^2/s],
-        the contact's lateral velocity u or its vertical velocity W_c [m/s]. For a user's own model: the rate
-        of a state, ``"v'"``; the formula may then use the model's states and parameters. If that model has a
-        mass matrix, also a force along a coordinate, ``"force(x)"``, or between two, ``"force(b - a)"``: on
-        b, with its reaction on a. If it has measured inputs, the delay of one, ``"delay(u)"``: the formula is
-        then one parameter.
+        The equation that the formula is added to. It is the torque [m^2/s^2], the friction coefficient k
+        [m^2/s], or the lateral velocity u or vertical velocity W_c of the contact [m/s]. In a user's own
+        model it is the rate of a state, ``"v'"``. The formula may then use the model's states and parameters.
+        A model with a mass matrix also has forces along a coordinate, ``"force(x)"``, or between two,
+        ``"force(b - a)"``: on b, with its reaction on a. A model with measured inputs also has their delays,
+        ``"delay(u)"``. The formula of a delay is a single parameter.
     expression : str or SymPy expression
-        It may use the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), the plain
-        model's friction ``k``, moment of ``inertia`` and ``g``, a disk's ``W`` and ``R`` (a pendulum's
-        ``length``), numbers, ``pi``, and the effect's parameters. Operators and functions: ``+ - * / ^``,
-        ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``,
-        ``atan2(y, x)``, ``abs``, ``sign``, ``min(a, b)``, ``max(a, b)``, ``where(x > c, a, b)``, ``bspline``
-        (the cardinal cubic B-spline) and the splines of :func:`curve`. Runs of disk and pendulum locate the
-        kink of ``abs(Omega)``, those of a user's own model all kinks (see :class:`udd.Model`). Runs of disk
-        and pendulum cross other kinks by small steps, without a power series.
+        It may use the time ``t``, the state ``Omega, Y, Z, beta`` (of a pendulum also ``theta``), numbers,
+        ``pi``, and the effect's parameters. It may also use the plain model's friction ``k``, moment of
+        ``inertia`` and ``g``, and a disk's ``W`` and ``R`` or a pendulum's ``length``. Operators and
+        functions: ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``,
+        ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``, ``sign``, ``min(a, b)``, ``max(a, b)``,
+        ``where(x > c, a, b)``, ``bspline`` (the cardinal cubic B-spline) and the splines of :func:`curve`.
+        Runs of disk and pendulum locate the kink of ``abs(Omega)``. They cross other kinks by small steps,
+        without a power series. Runs of a user's own model locate all kinks (see :class:`udd.Model`).
     momentum : {"consistent", "constraint"}, optional
-        Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
+        Way of a lateral or vertical effect to enter the angular momentum. See :class:`Spec`.
     name : str
         Prefix of its parameters' names: ``name.parameter``.
     title : str, optional
@@ -236,7 +236,7 @@ def formula(
     Notes
     -----
     The text is parsed to a list of operations, which the core evaluates as it does the library's effects;
-    nothing in it is executed. The integrator locates the kink of ``abs(Omega)``, but no other kinks; a
+    nothing in it is executed. The integrator locates the kink of ``abs(Omega)``, but no other kinks. A
     formula must not jump.
 
     Examples
@@ -301,9 +301,9 @@ def curve(
     low, high : float
         Its ends. Beyond them it is constant.
     coefficients : array_like, shape (n,)
-        At least four. They become the parameters ``c0``, ``c1``, ..., all amplitudes.
+        At least four. They become the parameters ``c0``, ``c1``, ... All are amplitudes.
     periodic : bool
-        True if its end is joined to its beginning, as over an angle from 0 to 2 pi.
+        True if its end is joined to its beginning. An angle from 0 to 2 pi needs this.
     momentum : {"consistent", "constraint"}, optional
         Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str
@@ -372,16 +372,17 @@ def surface(
     Parameters
     ----------
     slot : {"torque", "friction", "lateral", "vertical"}
-        The equation that the surface is added to; see :func:`formula`.
+        The equation that the surface is added to. See :func:`formula`.
     coordinates : pair of str or SymPy expression
-        Coordinates of the surface, as for :func:`curve`.
+        Coordinates of the surface. They are as for :func:`curve`.
     low, high : pair of float
         Its ends along each. Beyond them it decays to zero within three knots along the first coordinate, and
         is constant along the second.
     coefficients : array_like, shape (m, n)
-        At least four along each. They become the parameters ``c0``, ``c1``, ... row by row, all amplitudes.
+        At least four along each. They become the parameters ``c0``, ``c1``, ... row by row. All are
+        amplitudes.
     periodic : bool
-        True if its end is joined to its beginning along the second coordinate, as over an angle.
+        True if its end is joined to its beginning along the second coordinate. An angle needs this.
     momentum : {"consistent", "constraint"}, optional
         Way of a lateral or vertical effect to enter the angular momentum; see :class:`Spec`.
     name : str

@@ -27,13 +27,14 @@ class Defects:
     Attributes
     ----------
     clutter : int
-        Patches in the marks' colours that hang on the wall, at random places.
+        Number of patches in the marks' colours on the wall, at random places.
     bars : int
-        Cross-bars of the support before the disk, 95 mm wide.
+        Number of cross-bars of the support in front of the disk. They are 95 mm wide.
     off_axis : (float, float)
-        Angles in rad by which the camera stands beside and below the disk's axis, aimed at the pivot.
+        Angles in rad between the disk's axis and the camera, to the side and downward. The camera is aimed at
+        the pivot.
     distance : float
-        From the camera to the pivot, m; how strong the perspective of `off_axis` is.
+        Distance from the camera to the pivot, m. It sets the strength of the perspective of `off_axis`.
     lens : float
         Radial distortion: relative displacement at the picture's corner, above 0 for barrel.
     readout : float
@@ -48,7 +49,7 @@ class Defects:
     mark_offsets : sequence of four (float, float)
         How far each mark (red, orange, blue, green) is glued off its place, m: (clockwise, outward).
     mark_strength : sequence of four float
-        1 for a mark in full colour, 0 for one that fell off.
+        Strength of each mark's colour: 1 for full colour. It is 0 for a mark that fell off.
     dropped : sequence of int
         Frames left out of the file; the time stamps of the others stay.
     repeated : sequence of int
@@ -58,16 +59,15 @@ class Defects:
     after : float
         Time in s for which the film goes on after the run's end, with the disk falling freely.
     poster : float
-        Size of a picture of the device that hangs on the wall beside it, relative to the device; 0: none.
+        Size of a picture of the device on the wall next to it, relative to the device. 0 means none.
     mirrored : bool
         The film shows left as right, as selfie cameras do.
     turned : int
         Quarter turns clockwise by which the whole film is turned.
     shake : float
-        Motion of a camera held in the hand, pixels r.m.s.; it also rolls a little.
+        Motion of a hand-held camera, pixels r.m.s. It also rolls a little.
     bumps : sequence of (float, float, float)
-        Times in s from which on the camera looks elsewhere, and by how many pixels (right, down) the picture
-        then lies off its first place.
+        Times in s of bumps of the camera, with the new displacement of the picture in pixels (right, down).
     zooms : sequence of (float, float)
         Times in s from which on the picture is enlarged, and by which factor.
     gains : sequence of (float, float)

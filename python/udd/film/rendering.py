@@ -120,15 +120,15 @@ def render(
     ----------
     trajectory : Trajectory
         A run of the disk, from `udd.simulate`: times `t` (n,) in s and `state` (n, 4), [Omega, Y, Z, beta].
-        Between the samples the motion is the dense output of a run made with it, else a cubic (with the
-        model's rates where the trajectory has a model); samples too far apart for a cubic are refused.
+        Between the samples the motion is the dense output, if the run has one. Otherwise it is a cubic, with
+        the rates of the model if the trajectory has a model. Samples too far apart for a cubic are refused.
     path : path-like
         File to write, ``.mp4`` or ``.mov``. An older film is replaced once the new one is complete.
     support : float
         Width of the black support relative to the real one (26 mm for R = 0.08 m); 0 films the disk alone.
     background : array_like, optional
-        What stands behind: a picture (height, width, 3) of codes 0 to 255 in red, green, blue, or one colour
-        (3,); by default a grey wall and a table.
+        Background: a picture (height, width, 3) of codes 0 to 255 in red, green, blue, or a colour (3,). The
+        default is a grey wall and a table.
     noise : float
         Standard deviation of the sensor noise, in codes of 255.
     quality : float
@@ -137,13 +137,13 @@ def render(
         ``"h264"``, ``"hevc"``, or ``"mp4v"`` for MPEG-4 as OpenCV's ``VideoWriter`` writes it (without a
         choice of quality).
     defects : udd.film.Defects, optional
-        What goes wrong: clutter, cross-bars, a camera that stands aside, a rolling shutter, uneven light,
-        marks glued off their places, frames dropped, and so on; by default nothing.
+        Defects of scene and camera, such as clutter, an oblique camera, a rolling shutter, uneven light or
+        dropped frames. By default there are none.
     layout : sequence of mappings, optional
         Square marks instead of the four: ``{"at": [y, z], "colour": "red"}`` or ``{"at": [y, z], "tag":
         "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given); sides upright at beta = 0.
     rng : int, Generator or None
-        Of the noise. The same whole number gives the same film; None takes fresh entropy.
+        Random generator of the noise. The same whole number gives the same film; None takes fresh entropy.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.

@@ -85,12 +85,13 @@ class Reading(OneLine):
     Attributes
     ----------
     name, unit : str
+        Name of the channel, and its unit.
     noise : float
-        Standard deviation that the fit assumed for a typical frame.
+        Standard deviation that the fit assumed. It is that of a typical frame.
     shown : float
-        The same as the misfits show it.
+        Standard deviation of the misfits.
     step : float
-        Step in which the channel was read; 0 if its values lie on no lattice.
+        Step in which the channel was read. It is 0 if its values lie on no lattice.
     memory : float
         Lag-1 autocorrelation of the noise.
     trusted : bool
@@ -139,26 +140,27 @@ class Diagnostics:
     Attributes
     ----------
     missed : list of ModelError
-        One for every equation except those in which one state is the rate of another.
+        Remaining model error of each equation. Equations in which a state is the rate of another have none.
     tight : bool
         True if the model error could be reduced to that of a right model.
     white : dict of str to float
         Probability that the innovations of each channel are white noise (Ljung-Box). Channels with negligible
-        innovations are left out; empty if the record is too short.
+        innovations are left out. It is empty if the record is too short.
     ran_off : list of RunawayParameter
+        Parameters that diverged.
     factor : float
-        Inflation of the standard errors: 1 if nothing is missing.
+        Inflation of the standard errors. It is 1 if nothing is missing.
     sensor : list of Reading
-        The noise of each channel and the steps in which it was read.
+        Noise of each channel, with the step in which it was read.
     rests : float or None
-        Time from which on the disk of a film is at rest, s; later frames are left out.
+        Time from which on the disk of a film is at rest [s]. Later frames are left out.
     filmed : bool
-        True if it is a film, whose own faults colour even a right model's innovations.
+        True if the record is a film. Faults of a film correlate even a right model's innovations.
     inputs : list of NoisyInput
-        The inputs with noisy samples.
+        Inputs with noisy samples.
     by_inputs : list of float
-        Errors of the rates caused by the inputs' noise, r.m.s. over a frame; empty unless they explain all of
-        the model error.
+        Errors of the rates caused by the inputs' noise, r.m.s. over a frame. It is empty unless they explain
+        all of the model error.
     unit : str or None
         Sentence about a unit that explains the record far better than the given one.
     clock : str or None

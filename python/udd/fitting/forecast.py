@@ -45,12 +45,12 @@ __all__ = ["Forecast", "forecast"]
 Array = NDArray[np.float64]
 
 # Times in s; for a user's own model in units of `motion_time_scale`.
-_STEP = 0.01  # between the times of a forecast
-_KICK = 0.1  # between the random kicks that represent the assumed model error
-_FEWEST = 6  # frames needed to determine a state
-_TRIES = 100  # draws of a member's parameters that are invalid for the model
+_STEP = 0.01  # Interval between the times of a forecast.
+_KICK = 0.1  # Interval between the random kicks that represent the assumed model error.
+_FEWEST = 6  # Frames needed to determine a state.
+_TRIES = 100  # Draws of a member's parameters that are invalid for the model.
 _RTOL, _ATOL = 1e-9, 1e-12
-_GROWTH_TIME = 4000.0  # over which the exponent is averaged, to an error of one or two percent
+_GROWTH_TIME = 4000.0  # Time of the average for the exponent, which has an error of 1 or 2 percent.
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,20 +60,20 @@ class Forecast(Drawable):
     Attributes
     ----------
     t : ndarray (k,)
-        Times on the measurement's clock, s; the first is the start of the forecast.
+        Times on the measurement's clock [s]. The first is the start of the forecast.
     median, low, high : ndarray (k, m)
-        Quantiles of the members, for every channel of the measurement and in its units; `low` and `high`
-        enclose the share `level` of them. NaN if more than half of the disks have lost contact with the
+        Quantiles of the members, for every channel of the measurement, in its unit. Between `low` and `high`
+        lies the share `level` of them. NaN if more than half of the disks have lost contact with the
         wheels.
     members : ndarray (n, k, m)
-        The ensemble; NaN after a disk has lost contact with the wheels.
+        The ensemble. NaN after a disk has lost contact with the wheels.
     names : tuple of str
-        The channels.
+        Names of the channels.
     level : float
         Share of the members between `low` and `high`.
     error : float
-        Threshold for divergence, m of the disk's centre or rad of a pendulum; for a user's own model the root
-        mean square over the columns, in units of the motion's spread.
+        Threshold for divergence: m of the disk's centre, or rad of a pendulum. For a user's own model it is
+        the root mean square over the columns, in units of the motion's spread.
     valid_time : float
         Time after the start until half of the members have diverged from the median by `error`, s; inf if the
         forecast ends before.

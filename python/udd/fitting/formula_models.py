@@ -199,10 +199,11 @@ def levels_of(
     ----------
     model : FormulaModel
     t, states : ndarray (n,), (n, d)
-        A first guess.
+        First guess of the states, with its times.
     sigma : ndarray (n, c)
-        The noise of the observations, for each of the model's channels; infinite if not observed.
+        Noise of the observations, for each channel of the model. It is infinite if not observed.
     linked : ndarray of bool (n - 1,)
+        True if the model leads from a frame to the next.
     """
     dt = np.diff(t)[linked]
     step = float(np.median(dt)) if len(dt) else 1.0

@@ -24,10 +24,10 @@ LEAP = 3  # levels that a right model can skip
 ROUGH = 10.0
 #: Decrease in evidence (nats) that is acceptable when the model error is reduced.
 LESS = 3.0
-_LITTLE = 3  # further steps for a fit that may be close to its minimum
-_FAR_OFF = 10.0  # chi2 per degree of freedom of a model that is far from explaining the data
-_LOOSE = 0.3  # leverage above which misfits do not show the noise
-_SAME = 0.03  # autocorrelations that differ by less need no further fit
+_LITTLE = 3  # Further steps for a fit that may be close to its minimum.
+_FAR_OFF = 10.0  # Value of chi2 per degree of freedom of a model that is far from explaining the data.
+_LOOSE = 0.3  # Leverage above which misfits do not show the noise.
+_SAME = 0.03  # Autocorrelations that differ by less need no further fit.
 
 
 @dataclass(frozen=True)

@@ -36,11 +36,11 @@ class Noise(OneLine):
     Attributes
     ----------
     factor : ndarray (m,)
-        Factors on the stated standard deviations.
+        Factors on the stated standard deviations. They are 1 if these were right.
     blur : ndarray (m,)
         Growth with the angular speed, in the channel's unit per rad/s.
     weight : ndarray (n,)
-        Weight of each frame: 1, or less for an outlier.
+        Weight of each frame. It is 1, or less for an outlier.
     memory : ndarray (m,)
         Lag-1 autocorrelation of the noise.
     """
@@ -98,9 +98,9 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     misfit : ndarray (n, m)
         Observations minus fitted values.
     seen_variance : ndarray (n, m)
-        Variance of the fitted values; the squared misfits are smaller than the noise by it.
+        Variance of the fitted values. The squared misfits are smaller than the noise by it.
     before : Noise
-        The noise that the fit assumed.
+        Noise that the fit assumed.
     """
     seen = record.observed
     assumed = before.sd(record, omega)
@@ -145,9 +145,9 @@ def noise_autocorrelation(record: Record, misfit: Array, sd: Array, weight: Arra
     ----------
     record : Record
     misfit, sd : ndarray (n, m)
-        Misfits of a model with a small model error, and the noise's standard deviation.
+        Misfits of a model with a small model error, and the standard deviation of the noise.
     weight : ndarray (n,)
-        Weights of the frames; outliers (below 1) are left out.
+        Weights of the frames. Outliers (below 1) are left out.
     """
     there = record.observed & (weight == 1.0)[:, None]
     scaled = np.divide(misfit, sd, out=np.zeros(misfit.shape), where=there)

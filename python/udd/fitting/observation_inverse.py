@@ -12,11 +12,11 @@ from udd.models.formula_model import FormulaModel
 
 Array = NDArray[np.float64]
 
-_STEP = 1e-5  # of a difference quotient
-_FIRST, _NEXT = 30, 3  # Gauss-Newton steps of the first frame, and of those after it
-_RESOLVED = 0.9  # diagonal of the resolution matrix from which on the sensors determine a state
-_SINGULAR = 1e-3  # relative singular value below which a combination of states is not observed
-_FARTHEST = 1.0  # rad or unit: the longest step
+_STEP = 1e-5  # Step of a difference quotient.
+_FIRST, _NEXT = 30, 3  # Gauss-Newton steps of the first frame, and of those after it.
+_RESOLVED = 0.9  # Diagonal of the resolution matrix above which the sensors determine a state.
+_SINGULAR = 1e-3  # A combination of states with a smaller relative singular value is not observed.
+_FARTHEST = 1.0  # Longest step, in rad or the unit.
 
 
 class Inverted(NamedTuple):
@@ -25,9 +25,9 @@ class Inverted(NamedTuple):
     Attributes
     ----------
     states : ndarray (n, d)
-        Zero, or their start values, if no sensor shows them.
+        States at each frame. They are zero, or their start values, if no sensor shows them.
     shown : ndarray of bool (d,)
-        Which states the sensors of one frame show.
+        True for states that the sensors of a single frame determine.
     slopes : ndarray (n, d, c)
         Derivatives of each state by each sensor.
     """
@@ -49,9 +49,9 @@ def inverted(
     seen : dict of str to ndarray (n,)
         Readings of some of the sensors, without gaps.
     noise : dict of str to float
-            Their noise, which determines their weights.
-        start : ndarray (d,)
-            First guess for the first frame.
+        Noise of the sensors, which determines their weights.
+    start : ndarray (d,)
+        First guess for the first frame.
     """
     model = model._with(delays=tuple(pair for pair in model.delays if pair[0] in model.inputs))
     columns = [model.channels.index(name) for name in seen]

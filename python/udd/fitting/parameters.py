@@ -20,15 +20,15 @@ class Free:
     Attributes
     ----------
     name : str
-        Followed by the number of the film in brackets if it belongs to one of several.
+        Name. The number of the film follows in brackets if the parameter belongs to one of several.
     role : str
         ``"model"``, ``"camera"`` or ``"clock"``.
     index : int
-        Its place among the parameters of that role.
+        Its place among the parameters of that role. It is counted from 0.
     mean, sd : float
-        The prior; an infinite standard deviation for none.
+        Mean and standard deviation of the prior. Infinite means no prior.
     film : int or None
-        The film that it belongs to; None if all share it.
+        The film that it belongs to. None if all share it.
     """
 
     name: str

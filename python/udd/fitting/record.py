@@ -27,11 +27,11 @@ Array = NDArray[np.float64]
 
 #: A frame is an outlier if its distance exceeds this times the typical one; normal noise does in 1 of 1e8.
 _ODD = 9.0
-_FEWEST = 10  # frames of a fit
-_FEWEST_OF_SEVERAL = 4  # frames of each of several records: with fewer, its start states use up all of them
-_SHORT = 30  # frames, below which a record by itself hardly shows its noise
-_LEAP = 0.5  # share of the steps before and after that a bend of the motion does not reach
-_CLEANED = 8  # rounds of outlier detection: outliers close to each other hide each other
+_FEWEST = 10  # Frames of a fit.
+_FEWEST_OF_SEVERAL = 4  # The same of each of several records. Start states use up fewer.
+_SHORT = 30  # A record with fewer frames hardly shows its noise.
+_LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
+_CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,9 +44,9 @@ class Record(OneLine):
         Time of each frame since its measurement's first row, s. Frames missing in short gaps are inserted, so
         that no flow runs for long.
     seen : ndarray (n, m)
-        The observations; 0 if not observed.
+        Observations. They are 0 if not observed.
     sigma : ndarray (n, m)
-        Standard deviation that the measurement states; infinite if a channel was not observed.
+        Standard deviation that the measurement states. It is infinite if a channel was not observed.
     rho : ndarray (n, m, m)
         Correlation of the channels' errors.
     linked : ndarray of bool (n - 1,)
@@ -54,9 +54,9 @@ class Record(OneLine):
     states : ndarray (n, d)
         A first guess of the states.
     odd : ndarray of bool (n,)
-        Outliers, far from the curve through their neighbours; a fit starts without them.
+        True for outliers, which are far from the curve through their neighbours. A fit starts without them.
     row : ndarray of int (n,)
-        The measurement's row of a frame; -1 if it was inserted.
+        Row of the frame in the measurement. It is -1 if the frame was inserted.
     film : ndarray of int (n,)
         The number of the measurement that a frame belongs to.
     origins : tuple of float

@@ -15,13 +15,13 @@ from udd.models.profile import SensorProfile
 
 Array = NDArray[np.float64]
 
-_FEW = 8  # gaps between values that are needed to detect a lattice
-_SAME = 1e-7  # share of the range below which two values are equal
-# tolerance of gaps relative to the step, and the share of gaps that must be within it
+_FEW = 8  # Gaps between values that are needed to detect a lattice.
+_SAME = 1e-7  # Share of the range below which two values are equal.
+# Tolerance of gaps relative to the step, and the share of gaps that must be within it.
 _OFF, _MOST = 0.02, 0.98
-_ORDERS = (3, 4, 5, 6)  # of the differences that distinguish noise from motion
-_MOVES = 3.0  # standard errors by which a frame differs from the one before, unless a film is at rest
-_STILL = 10  # minimum of frames at rest at the end of a film
+_ORDERS = (3, 4, 5, 6)  # Orders of the differences that distinguish noise from motion.
+_MOVES = 3.0  # Standard errors: a frame differs by this from the last, unless the film is at rest.
+_STILL = 10  # Minimum of frames at rest at the end of a film.
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 _CLOSE = 1e-3  # relative tolerance of a round number
 # correlation of neighbours in differences of noise, relative to white noise, above which they count as noise

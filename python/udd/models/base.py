@@ -38,39 +38,39 @@ def require_model(given: object) -> None:
 
 
 class Model:
-    """A model of the user's own; and what all models have in common.
+    """Model in text form, and base class of all models.
 
     Models are immutable: changes make a new one.
 
     Parameters
     ----------
     states : sequence of str
-        The names of the state's components, 1 to 12.
+        Names of the state's components. There are 1 to 12.
     equations : mapping of str to formula, or sequence of formula
-        The rate of each state: text or a SymPy expression of the states, the parameters, the time ``t``,
-        numbers and ``pi``, with ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``, ``sin``, ``cos``, ``tan``,
-        ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``, ``sign``, ``min(a, b)``,
-        ``max(a, b)``, ``where(x > c, a, b)`` and ``bspline``, the cardinal cubic B-spline.
+        The rate of each state: text or a SymPy expression. It may contain the states, the parameters, the
+        time ``t``, numbers and ``pi``. Operators and functions are ``+ - * / ^``, ``sqrt``, ``exp``, ``ln``,
+        ``sin``, ``cos``, ``tan``, ``sinh``, ``cosh``, ``tanh``, ``atan``, ``atan2(y, x)``, ``abs``, ``sign``,
+        ``min(a, b)``, ``max(a, b)``, ``where(x > c, a, b)`` and ``bspline``, the cardinal cubic B-spline.
     parameters : mapping of str to float, optional
         The parameters' values.
     angles : iterable of str
         The states that are angles in rad: they may grow without end.
     mass : sequence of sequence of formula, optional
-        The mass matrix of a mechanical model, with a row and a column for each coordinate (a state whose
-        equation is another state), in their order: formulas of the states and parameters. The equations are
-        stated in full all the same; with it, what :func:`udd.discover` finds missing is a force that enters
-        every acceleration, such as friction in a joint.
+        The mass matrix of a mechanical model: formulas of the states and parameters. It has a row and a
+        column for each coordinate (a state whose equation is another state), in their order. The equations
+        are still stated in full. With a mass matrix, :func:`udd.discover` searches for missing forces, which
+        enter every acceleration, such as friction in a joint.
     inputs : sequence of str, optional
-        Measured inputs (exogenous signals), such as a motor's torque: names that the equations may use. Their
-        samples come with the run or the record: ``udd.simulate(..., inputs=...)``,
+        Measured inputs (exogenous signals), such as a motor's torque. The equations may use their names.
+        Their samples come with the run or the record: ``udd.simulate(..., inputs=...)``,
         ``udd.Measurement(..., inputs=...)``.
     delays : mapping of str to str, optional
-        Inputs that the model feels later, and sensors that are late, each with the parameter that is the
+        Inputs that act on the model later, and sensors that are late. Each has the parameter that is its
         delay [s].
     observe : mapping of str to formula, optional
-        What sensors see (the output equation): for each column of a measurement a formula of the states,
-        their rates (``w'``), the parameters and ``t``, such as ``{"volts": "gain*theta + zero"}``; at most
-        12. Without it the columns are states.
+        Readings of the sensors (the output equation): a formula for each column of a measurement, at most
+        12. It may contain the states, their rates (``w'``), the parameters and ``t``. An example is
+        ``{"volts": "gain*theta + zero"}``. Without it the columns are states.
 
     Raises
     ------

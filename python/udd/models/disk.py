@@ -54,12 +54,12 @@ class Disk(CompiledModel):
     g : float
         Gravity [m/s^2].
     k0, k1, k2 : float
-        Friction: floor at high speed [m^2/s], value at rest [m^2/s], fall with the speed [m^2].
+        Friction: floor at high speed [m^2/s], value at rest [m^2/s], decrease with the speed [m^2].
     effects : iterable of Effect
-        See :mod:`udd.effects`.
+        Effects that the equations contain in addition. See :mod:`udd.effects`.
     edge : {"stop", "ignore"}
-        What happens where the contact reaches the edge, ``Y^2 + Z^2 = R^2``: the run ends with the outcome
-        "ejected", or the equations are followed beyond their domain.
+        Behaviour at the edge, ``Y^2 + Z^2 = R^2``. The run ends with the outcome "ejected", or the equations
+        are followed beyond their domain.
 
     Raises
     ------
@@ -187,10 +187,10 @@ def _on_the_wheels(p: Parameters, states: Floats) -> NDArray[np.bool_]:
 #: Decades by which a stated speed or length may be off: cm, mm and their inverses.
 _DECADES = (-3, -2, -1, 1, 2, 3)
 _DEGREE = np.pi / 180
-_BEYOND = 5.0  # radii: a disk is closer to its contact unless its place is in cm
-_SLOWEST = 0.5  # s between frames; a disk changes its motion in a quarter of that
-_NEAR = 0.25  # largest relative error of a ratio
-_SURE = 0.7  # correlation above which a slope counts
+_BEYOND = 5.0  # Radii: a disk is closer to its contact unless its place is in cm.
+_SLOWEST = 0.5  # Seconds between frames. A disk changes its motion in a quarter of that.
+_NEAR = 0.25  # Largest relative error of a ratio.
+_SURE = 0.7  # Correlation above which a slope counts.
 
 
 def _mistaken_unit(model: Disk, step: float, values: Floats) -> str | None:
@@ -328,10 +328,11 @@ Disk.profile = ModelProfile(
         units=("m", "m", "rad"),
         sigma=(5e-4, 5e-4, 7e-3),
         compared=2,
-        # A pivot found to a few millimetres, a picture upright to 2 degrees and scaled to 1 %, marks whose
-        # centre is off by a millimetre, an orientation that lags the position by milliseconds, a shutter that
-        # may roll (a frame's time over a picture 0.4 m high), means over some 20 ms (of which a 24th of the
-        # square counts), a lens that distorts by 1 % at 0.2 m from the middle.
+        # The pivot is located to a few millimetres. The picture is upright to 2 degrees and scaled to 1 %.
+        # The centre of the marks is off by a millimetre, and the orientation lags the position by
+        # milliseconds. The shutter may roll (a frame's time over a picture 0.4 m high). Frames are means over
+        # some 20 ms (of which a 24th of the square counts). The lens distorts by 1 % at 0.2 m from the
+        # middle.
         camera={
             "y0": 5e-3,
             "z0": 5e-3,
@@ -409,8 +410,8 @@ Disk.profile = ModelProfile(
         },
         measured=_measured,
         taken_as_known=(
-            "The radius of the disk and gravity were taken as known. A camera, a drive and a gravity that "
-            "all lean the same way look upright: only angles between them can be seen."
+            "The radius of the disk and gravity were taken as known. The angles between camera, drive "
+            "and gravity can be measured, but no angle that all three share."
         ),
     ),
 )

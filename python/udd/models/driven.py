@@ -89,7 +89,7 @@ def moved_pendulum(
     length : float
         Distance from the pivot to the centre of mass [m].
     inertia : float, optional
-        Moment of inertia about the pivot per unit mass [m^2]; by default `length` squared.
+        Moment of inertia about the pivot per unit mass [m^2]. The default is `length` squared.
     k0 : float
         Viscous friction [m^2/s].
     g : float

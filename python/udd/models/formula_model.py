@@ -49,16 +49,16 @@ class FormulaModel(Model, written=True):
     Attributes
     ----------
     state_names : tuple of str
-        The names of the state's components, in order.
+        Names of the state's components, in order.
     texts : tuple of str
-        Their rates.
+        Rates of the states. The order is the same.
     values : tuple of (str, float)
-        The parameters.
+        Parameters with their values.
     angles : tuple of str
         The states that are angles.
     effects : tuple of Effect
-        Terms added to its equations: formulas and curves whose slot is a rate, as in ``"v'"``, or a force,
-        as in ``"force(x)"``.
+        Terms that were added to the equations. Their slot is a rate, as in ``"v'"``, or a force, as in
+        ``"force(x)"``.
     mass : tuple of tuple of str
         The mass matrix; empty if not given.
     inputs : tuple of str

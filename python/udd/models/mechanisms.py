@@ -39,9 +39,9 @@ def mechanism(
     Parameters
     ----------
     coordinates : mapping of str to str
-        The name of each coordinate and of its speed.
+        Name of each coordinate, with the name of its speed.
     mass : sequence of sequence of formula, shape (n, n)
-        The mass matrix M, symmetric.
+        The mass matrix M. It must be symmetric.
     forces : sequence of formula, shape (n,)
         The generalised forces f, those of gravity and those of Coriolis among them.
     parameters, angles, inputs, delays, observe
@@ -171,11 +171,11 @@ def pendulum_chain(
     Parameters
     ----------
     masses : sequence of float, shape (n,)
-        [kg], parameters ``m1, ...``.
+        Masses [kg]. The parameters are ``m1, ...``.
     lengths : sequence of float, shape (n,)
-        From joint to joint [m], parameters ``l1, ...``; that of the last link plays no part.
+        Distances from joint to joint [m], parameters ``l1, ...``. That of the last link has no effect.
     centres : sequence of float, shape (n,)
-        From a link's upper joint to its centre of mass [m], parameters ``r1, ...``.
+        Distances from a link's upper joint to its centre of mass [m], parameters ``r1, ...``.
     inertias : sequence of float, shape (n,)
         Moments of inertia about the upper joints [kg m^2], parameters ``I1, ...``.
     friction : sequence of float, shape (n,), optional

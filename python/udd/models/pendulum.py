@@ -34,7 +34,7 @@ from .profile import (
 
 @dataclass(frozen=True, init=False)
 class Pendulum(CompiledModel):
-    """A pendulum, per unit mass, for the state ``[Omega, theta]`` in rad/s, rad, with ``theta = 0`` hanging.
+    """Pendulum, per unit mass, for the state ``[Omega, theta]`` in rad/s, rad, with ``theta = 0`` hanging.
 
     ::
 
@@ -45,7 +45,7 @@ class Pendulum(CompiledModel):
     length : float
         Distance from the pivot to the centre of mass [m].
     inertia : float, optional
-        Moment of inertia about the pivot per unit mass [m^2]; by default `length` squared, a point mass.
+        Moment of inertia about the pivot per unit mass [m^2]. The default is `length` squared, a point mass.
     g : float
         Gravity [m/s^2].
     k0 : float

@@ -37,32 +37,33 @@ class DynamicsProfile:
     Attributes
     ----------
     time_scale : float
-        About the unit of time in which the motion takes place, that of the disk being 0.27 s.
+        Typical time of the motion. That of the disk is 0.27 s.
     time_unit : str
-        ``"s"``; empty where time has no unit.
+        Unit of time. It is ``"s"``, or empty for a dimensionless model.
     drive : str or None
-        The parameter that drives the motion: what a fit holds at rest where it is zero.
+        Parameter that drives the motion. If it is zero, a fit fixes it at zero.
     start : tuple of float or None
-        A state from which orbits reach the main attractor; None where that is the user's to say.
+        State from which orbits reach the main attractor. None if the user states it.
     section : str or None
-        The component whose zero is the usual Poincaré section, and which its pictures show; None for the
+        Component whose zero is the usual Poincaré section, and which its pictures show. If None, it is the
         maxima of the first state.
     crossing_rate : callable or None
-        ``(parameters) -> rate``: typical crossings of a section in a unit of time; None for a tenth.
+        ``(parameters) -> rate``: typical crossings of a section in a unit of time. None means a tenth.
     sizes : callable or None
-        ``(parameters) -> (sizes, clock)``: what is large for the components by name, and a typical time of
-        the motion; None where the states that occur say it.
+        ``(parameters) -> (sizes, clock)``: large values of the components by name, and a typical time of the
+        motion. None if both follow from the states of the run.
     rotation : str or None
-        A component that is a speed of rotation, of a model whose state holds no angle.
+        Component that is a speed of rotation. Only models without an angle in their state need it.
     inertia : callable or None
-        ``(model, states) -> inertia``: the moment of inertia per unit mass, m^2.
+        ``(model, states) -> inertia``: the moment of inertia per unit mass [m^2].
     energy : callable or None
-        ``(model, states, rates) -> Powers``; None where no energy is known.
+        ``(model, states, rates) -> Powers``. None if the model has no energy function.
     averages : callable or None
-        ``(model, exponents, mean, product) -> dict``: how far time averages on a bounded orbit are from what
-        they must be, by what they are. `mean` (d,) is that of the states, `product` (d, d) that of products.
+        ``(model, exponents, mean, product) -> dict``: deviations of time averages from their exact values on
+        a bounded orbit, by name. `mean` (d,) holds the means of the states, and `product` (d, d) those of
+        products.
     inside : callable or None
-        ``(parameters, states) -> bool``: where a model that can leave its domain has not left it.
+        ``(parameters, states) -> bool``: True for states within the domain of the model.
     """
 
     time_scale: float = 0.25
@@ -91,29 +92,29 @@ class SensorProfile:
     Attributes
     ----------
     columns, units : tuple of str
-        What a measurement consists of. Empty of a model that nothing measures, or any of whose states may be
-        measured.
+        Columns of a measurement, and their units. Empty for a model that is not measured, and for one all of
+        whose states may be measured.
     sigma : tuple of float
-        What a camera typically gets wrong in each column, in its unit, where a measurement does not say.
+        Typical error of a camera in each column, in its unit. Used if a measurement states no errors.
     compared : int
-        How many of the first columns two motions are compared by: places by their distance, an angle by its
-        size; none for the root mean square over all columns, in units of their spread.
+        Number of the first columns that are compared between two motions: places by their distance, an angle
+        by its size. Zero means the root mean square over all columns, in units of their spread.
     camera : mapping of str to float
-        What is known of the camera's parameters beforehand, as standard deviations around zero.
+        Prior of the camera's parameters. Each value is a standard deviation around zero.
     clock : float or None
-        The same of the rate of its clock; None where that is taken to be right.
+        Prior of the rate of its clock. None if the clock is assumed to be right.
     pivot : tuple of str
-        Those of the camera's parameters that say where the pivot is, the zero of an angle first.
+        Parameters of the camera for the place of the pivot. The zero of an angle comes first.
     zero : str or None
-        The camera's only parameter where an encoder reads the angle; None where no encoder does.
+        The only parameter of the sensor if an encoder reads the angle. None if no encoder can.
     faults : tuple of float
-        What no film is better than, however little its frames scatter: faults of the camera and of the
-        tracking that go with the motion, as a root mean square per column.
+        Least error of a film, however little its frames scatter: faults of the camera and of the tracking
+        that follow the motion. It is a root mean square per column.
     faithful : float
-        In a search noise that is not stated is at least this part of `sigma`.
+        Lower limit of noise that is not stated, as a share of `sigma`. Only a search uses it.
     sees_marks : bool
-        Whether a camera follows several marks. Then nothing that moves with the camera, or drifts, looks like
-        a motion of the body, and the frames show their own noise.
+        True if a camera follows several marks. Then a moving camera or a drift cannot be mistaken for a
+        motion of the body, and the frames show their noise.
     """
 
     columns: tuple[str, ...] = ()
@@ -136,17 +137,18 @@ class SensorProfile:
 
 @dataclass(frozen=True)
 class OtherUnit:
-    """Another unit that numbers may be in: the sentence that says so, and what changes then.
+    """Another unit in which the numbers may be, with the changes that follow from it.
 
     Attributes
     ----------
     text : str
+        Sentence that names the unit.
     parameters : dict of str to float
-        The model's parameters then.
+        Parameters of the model in this case.
     factors : dict of str to float
-        By what columns of the measurement are multiplied then, and the states with them.
+        Factors of columns of the measurement, and of states. Other columns keep their values.
     shifts : dict of str to float
-        What is added to columns of the measurement then, and to states.
+        Constants that are added to columns of the measurement, and to states.
     """
 
     text: str
@@ -175,37 +177,37 @@ class FitProfile:
         unit. With a large one a wrong model follows the data and the noise is estimated; with a small one
         weak effects show. A fit derives its model errors from the record. Empty if a search does so, too.
     searched : int or None
-        The number of these levels in a search; None for all.
+        Number of these levels in a search. None means all.
     equations : mapping of str to str, or None
-        The states in whose equations something may be missing, with the unit of the missing term; None for
-        all but those that define one state as the rate of another.
+        States in whose equations a term may be missing, with the unit of that term. None means all states
+        but those whose rate is another state.
     priors : mapping of str to float, or None
-        The free parameters by default, with the relative standard deviations of the priors; infinite without
-        a prior. By default all parameters are free, without priors.
+        Parameters that are free by default, with relative standard deviations of their priors. Infinite means
+        no prior. If None, all parameters are free, without priors.
     each : tuple of str
-        The parameters that by default have a separate value for each of several measurements.
+        Parameters with a separate value for each of several measurements by default.
     fixed : mapping of str to float
-        Standard uncertainties of the parameters that a fit fixes, in the parameters' units.
+        Standard uncertainties of the parameters that a fit fixes. They are in the parameters' units.
     stated : tuple of str
-        The parameters that a device's owner states: a fit far from them is one of something else.
+        Parameters that the owner of a device states. A fit far from them belongs to another device.
     unknown : tuple of str
-        The free parameters of a comparison of units: those known least; empty if no units are compared.
+        Free parameters of a comparison of units: the least certain ones. Empty if no units are compared.
     hardly : int
-        The model error of that comparison, as an index into `model_error`.
+        Model error of that comparison, as an index into `model_error`.
     mistaken_unit : callable
-        ``(model, step, values) -> sentence or None``: what is wrong with the numbers of the frames seen,
-        (n, m), `step` s apart, if they cannot be in s, m and rad.
+        ``(model, step, values) -> sentence or None``: the fault of observed numbers (n, m), `step` s apart,
+        that cannot be in s, m and rad.
     other_units : callable
-        ``(model) -> iterator of OtherUnit``: the units in which the numbers may be likelier.
+        ``(model) -> iterator of OtherUnit``: units in which the numbers may be more probable.
     drive_seen : callable or None
-        ``(t, values, seen) -> float``: the drive as the frames alone show it.
+        ``(t, values, seen) -> float``: the drive estimated from the frames alone.
     pace : callable or None
-        ``(parameters) -> float``: what sets the pace of the motion, and is stated.
+        ``(parameters) -> float``: the stated number that sets the frequency of the motion.
     ahead, window : float
-        How far a forecast goes by default, and the data before its start from which the state is filtered, s;
-        of a user's own model in units of the motion's time scale.
+        Default length of a forecast, and of the data before its start from which the state is filtered [s].
+        For a user's own model both are in units of the motion's time scale.
     valid_error : float
-        The error from which on a forecast is no longer valid, in :attr:`SensorProfile.error_unit`.
+        Error at which a forecast ceases to be valid, in :attr:`SensorProfile.error_unit`.
     """
 
     model_error: tuple[tuple[float, ...], ...] = ()
@@ -233,15 +235,15 @@ class Coordinate(OneLine):
     Attributes
     ----------
     name : str
-        As the formulas' grammar and the pictures call it.
+        Name in formulas and pictures.
     of : callable
-        ``(t, states) -> values``, states with the components along the last axis.
+        ``(t, states) -> values``. The states have their components along the last axis.
     rate : callable
-        ``(states, rates) -> values``: how fast it changes along the motion.
+        ``(states, rates) -> values``: its rate of change along the motion.
     angle : bool
-        Whether it counts modulo a turn.
+        True if it counts modulo a turn.
     text : str
-        What it is in formulas.
+        Formula of the coordinate.
     """
 
     name: str
@@ -284,10 +286,10 @@ class DiscoveryProfile:
     Attributes
     ----------
     horizons : tuple of float
-        Lengths of the free runs on held-out data, s; for a user-defined model, like all times
-        here, in units of the motion's time scale.
+        Lengths of the free runs on held-out data [s]. For a user's own model all times here are in units of
+        the motion's time scale.
     filter_window : float
-        Data before each of them from which its state is filtered, s.
+        Length of the data before each run from which its state is filtered [s].
     filter_level : int
         The model error of that filter, as an index into its levels.
     pairs : bool
@@ -296,14 +298,14 @@ class DiscoveryProfile:
         True if a wrong model with a small model error diverges within seconds, so that scores around it
         select the wrong effect. A motion that decays over minutes shows effects only around such a fit.
     brakes : tuple of str
-        Parameters that a pair of effects must not turn negative.
+        Parameters that must stay positive if a pair of effects is added.
     coordinates : callable
-        ``(model) -> tuple of Coordinate``: further inputs of a curve apart from the states and time.
+        ``(model) -> tuple of Coordinate``. These may be coordinates of a curve, like the states and time.
     slots : tuple of CurveSlot, or None
-        Where a curve may enter; None for the equations themselves.
+        Places where a curve may enter. None means the equations themselves.
     films : callable
-        ``(model, places) -> iterator of FurtherFilm``: proposals of the next film; `places` are states of the
-        record, in order.
+        ``(model, places) -> iterator of FurtherFilm``: proposals of the next film. The argument `places`
+        holds states of the record, in order.
     """
 
     horizons: tuple[float, ...] = (0.2, 0.4, 1.0, 2.0, 4.0)
@@ -329,31 +331,32 @@ class ShownProfile:
     Attributes
     ----------
     noun : str
-        What is filmed, as in ``"the disk"``.
+        Name of the device, as in ``"the disk"``.
     columns : tuple of str
-        What is drawn over time by default, all in one unit; a forecast's picture shows the last one.
+        Columns that are drawn over time by default, all in one unit. A forecast shows the last one.
     path : tuple of (str, str)
-        Across and up in the picture of an orbit; empty where none is drawn.
+        Abscissa and ordinate in the picture of an orbit. Empty if none is drawn.
     space : tuple of str, or None
-        The axes of phase space; None where that is a plane.
+        Axes of phase space. None if that is a plane.
     contact : bool
-        Whether an orbit is drawn around the contact, in the circle in which it must stay.
+        True if an orbit is drawn around the contact, in the circle in which it must stay.
     movie : float
-        For how long the models are shown side by side, s.
+        Length of the movie of the models side by side [s].
     forecast : float
-        For how long a forecast is shown, s.
+        Length of a forecast in pictures [s].
     forecast_end : bool
-        Whether a forecast's end is shown: that of a motion which loses step slowly.
+        True if the end of a forecast is shown. Motions that diverge slowly need it.
     run_start : tuple of float, or None
-        Where ``udd simulate`` starts.
+        Initial state of ``udd simulate``.
     meanings : mapping of str to str
-        The parameters in words.
+        Meanings of the parameters.
     measured : callable
-        ``(model, stated) -> text``: what was measured; `stated` is the model as it was stated.
+        ``(model, stated) -> text``: description of the measured device. The argument `stated` is the model
+        with the parameters that the user gave.
     taken_as_known : str
-        The sentence that says what no fit can find out.
+        Sentence about the numbers that no fit can determine.
     options : mapping of str to str
-        Parameters whose option on the command line has another name.
+        Options of the command line whose names differ from those of their parameters.
     """
 
     noun: str = ""

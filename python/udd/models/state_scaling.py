@@ -15,18 +15,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Coordinates:
-    """How states of a model are compared.
+    """Coordinates in which states of a model are compared.
 
     Attributes
     ----------
     size : ndarray (dim,)
-        By what each component is divided; infinity takes out an angle that the rates do not depend on.
+        Divisor of each component. Infinity removes an angle that the rates do not depend on.
     angle : ndarray of bool (dim,)
-        Which components count modulo 2 pi.
+        True for components that count modulo 2 pi.
     clock : float
         A typical time of the motion, in the model's unit of time.
     mirrors : tuple of ndarray (dim,)
-        The signs under which the equations of motion stay the same, the identity left out.
+        Changes of sign under which the equations of motion stay the same. The identity is left out.
     """
 
     size: Floats

@@ -20,13 +20,15 @@ class Batch:
     Attributes
     ----------
     model : Model
+        Model of all runs.
     values : ndarray (n or 1, p)
-        The parameters' values, a row for each run or one for all.
+        Values of the parameters. There is a row for each run, or a single row for all.
     starts : ndarray (n or 1, d)
-        The initial states, likewise.
+        Initial states. There is a row for each run, or a single row for all.
     rtol, atol : float
+        Tolerances of the runs.
     threads : int
-        0 for one per core.
+        Number of threads. 0 means one per core.
     progress : callable, optional
         Called with the number of runs that are done.
     max_step : float

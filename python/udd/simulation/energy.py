@@ -27,12 +27,12 @@ class EnergyBalance(Drawable, OneLine):
     Attributes
     ----------
     t : ndarray, shape (n,)
-        Times of the run's states.
+        Times of the states of the run.
     stored : ndarray, shape (n,)
-        The energy, kinetic and potential [m^2/s^2].
+        Kinetic and potential energy [m^2/s^2].
     motor, friction, effects : ndarray, shape (n,)
-        What the motor puts in, what the plain model's friction takes out, and what all added effects put in
-        [m^2/s^3]. The DLE's are dimensionless, and its damping counts as an effect.
+        Powers [m^2/s^3]. `motor` and `effects` increase the energy, and the friction of the plain model
+        decreases it. Those of the DLE are dimensionless, and its damping counts as an effect.
     """
 
     t: Array
@@ -42,15 +42,17 @@ class EnergyBalance(Drawable, OneLine):
     effects: Array
 
     def work(self, name: str) -> Array:
-        """A power's work from the start of the run on, by the trapezoidal rule.
+        """Integrate a power from the start of the run, by the trapezoidal rule.
 
         Parameters
         ----------
         name : {"motor", "friction", "effects"}
+            The power.
 
         Returns
         -------
         ndarray, shape (n,)
+            Work [m^2/s^2] up to each time.
         """
         power: Array = getattr(self, name)
         return np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(self.t)))
@@ -83,9 +85,9 @@ def energy_balance(run: Trajectory) -> EnergyBalance:
     Notes
     -----
     With ``I = R^2/2 + Y^2 + Z^2`` the disk's energy ``I Omega^2/2 + g Z`` changes by ``g W - k Omega^2``,
-    plus what the effects put in; so on every bounded orbit the time averages of motor and friction power are
-    the same without effects. Likewise ``omega^2/2 + z`` of the DLE changes by ``w - omega^2``. All powers are
-    read off the model's own rates.
+    plus the power of the effects. Without effects the time averages of motor and friction power are therefore
+    equal on every bounded orbit. Likewise ``omega^2/2 + z`` of the DLE changes by ``w - omega^2``. All powers
+    are computed from the rates of the model.
 
     References
     ----------

@@ -43,12 +43,12 @@ class Ensemble(Drawable):
     state : ndarray, shape (..., times, dim)
         States, in the order of ``model.state_names``; NaN after a run's end.
     outcome : ndarray of str, shape (...)
-        ``"finished"``, ``"ejected"`` (the disk left the wheels), ``"failed"`` (the solution blew up),
-        ``"chattering"``, ``"interrupted"``.
+        Outcome of each run. It is ``"finished"``, ``"ejected"`` (the disk left the wheels), ``"failed"`` (the
+        solution blew up), ``"chattering"`` or ``"interrupted"``.
     end : ndarray, shape (..., dim)
-        Each run's last state.
+        Last state of each run. It is given for runs that end early, too.
     t_end : ndarray, shape (...)
-        The time of that.
+        Time of the last state.
     model : Model
         What was run, before parameters were varied.
 
@@ -111,13 +111,13 @@ def ensemble(
     ----------
     model : Model
     t : array_like, shape (times,), or float
-        Times at which the states are wanted, increasing; the first is the initial time. A number means
-        the end of runs from 0, of which only the states there are wanted.
+        Increasing times of the states. The first is the initial time. A number is the end of runs from 0, and
+        only the last states are returned.
     state0 : array_like, shape (..., dim), optional
-        Initial states.
+        Initial states. Their leading axes are those of the result.
     parameters : mapping of str to array_like, optional
-        Other values of some of the model's parameters, of shapes that broadcast with one another and with
-        the leading axes of `state0`; the result has these axes.
+        Other values of some of the model's parameters. Their shapes broadcast with each other and with the
+        leading axes of `state0`. The result has these axes.
     rtol, atol, max_step : float
         As for :func:`udd.simulate`.
     method : {"auto", "taylor", "dopri5", "dop853"}
@@ -128,7 +128,7 @@ def ensemble(
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.
     partial : bool
-        After Ctrl-C return what there is, with a warning, instead of raising it with the exception.
+        If True, Ctrl-C returns the finished runs with a warning, instead of raising an exception.
     inputs
         As for :func:`udd.simulate`.
 

@@ -20,15 +20,16 @@ _ROUNDING = 1e-9  # of a signal's length, by which a run may go on beyond it
 
 
 def driven(model: M, times: NDArray[np.float64], inputs: Mapping[str, InputSignal | ArrayLike] | None) -> M:
-    """The model with the signals of its inputs, which must be known for all of the run.
+    """Return the model with the signals of its inputs, which must cover the whole run.
 
     Parameters
     ----------
     model : Model
+        The model with inputs.
     times : ndarray, shape (n,)
-        The first and the last time of the run at least; samples that come without times belong to these.
+        Times of the run; the first and the last suffice. Samples without times belong to these times.
     inputs : mapping of str to InputSignal or array_like, or None
-        None leaves the model as it is.
+        Signals by name. None leaves the model as it is.
 
     Raises
     ------

@@ -31,18 +31,18 @@ __all__ = ["Event", "Events", "Stats", "Trajectory", "simulate"]
 
 
 class Event(NamedTuple):
-    """Something that happened on the way.
+    """Event of a run.
 
     Attributes
     ----------
     kind : str
-        ``"reversal"`` (Omega = 0), ``"friction kink"`` (k reaches its floor), ``"edge"`` (the disk leaves
-        the wheels); with dry friction that is not smoothed also ``"stick"`` (it stops and sticks),
-        ``"slip"`` (it starts to move) and ``"band"`` (the speed passes the edge of Karnopp's band).
+        ``"reversal"`` (Omega = 0), ``"friction kink"`` (k reaches its floor) or ``"edge"`` (the disk loses
+        contact). Dry friction that is not smoothed also has ``"stick"`` (it stops and sticks), ``"slip"`` (it
+        starts to move) and ``"band"`` (the speed passes the edge of Karnopp's band).
     t : float
-        When.
+        Time of the event.
     state : ndarray, shape (dim,)
-        The state then, on the event's surface to 1e-12 of its size.
+        State at this time. It lies on the event's surface to 1e-12 of its size.
     """
 
     kind: str
@@ -57,11 +57,11 @@ class Events:
     Attributes
     ----------
     kind : tuple of str
-        What each is.
+        Kind of each event.
     t : ndarray, shape (n,)
-        When.
+        Times of the events.
     state : ndarray, shape (n, dim)
-        The states then.
+        States at these times.
     """
 
     kind: tuple[str, ...]
@@ -89,11 +89,11 @@ class Stats(NamedTuple):
     Attributes
     ----------
     accepted, rejected : int
-        Steps.
+        Numbers of steps.
     evaluations : int
-        Of the rates.
+        Number of evaluations of the rates.
     grazes : int
-        Jumps of the law that the run only just reached: beyond them its derivatives are in doubt.
+        Number of jumps of the law that the run only just reached. The derivatives after them are in doubt.
     method : str
         The method that took the steps: ``"dopri5"``, ``"dop853"``, ``"taylor"`` or ``"rodas"``.
     """
@@ -118,15 +118,15 @@ class Trajectory(Drawable):
     events : Events
         Crossings of the surfaces where the law changes, and of the disk's edge.
     outcome : {"finished", "ejected", "chattering"}
-        An ejected run ends on the disk's edge, a chattering one where the law switches again and again while
-        time stands still; the last time and state are there.
+        An ejected run ends on the disk's edge. A chattering run ends at a point where the law switches again
+        and again while time stands still. The last time and state are there.
     stats : Stats
         Accepted and rejected steps, evaluations of the rates, and the method that ran.
     model : Model
-        What was run.
+        The model of the run.
     dense : callable or None
-        The core's record of all steps where ``simulate(..., dense=True)`` was asked for; call the
-        trajectory instead.
+        The core's record of all steps, if ``simulate(..., dense=True)`` was called. Call the trajectory
+        instead.
 
     See Also
     --------
@@ -295,31 +295,31 @@ def simulate(
     model : Model
         :class:`udd.DLE`, :class:`udd.Disk`, :class:`udd.Pendulum` or a user's own :class:`udd.Model`.
     t : array_like, shape (n,), or float
-        Times at which the state is wanted, increasing; the first is the initial time. A number is the
-        end of a run from 0, of which the states after all accepted steps are given. The steps of a power
+        Increasing times of the states. The first is the initial time. A number is the end of a run from 0,
+        and the states after all accepted steps are returned. The steps of a power
         series are long: ``"auto"`` gives seven states within each of them, too.
     state0 : array_like, shape (dim,)
         The initial state.
     rtol, atol : float
-        Relative (at least 1e-15) and absolute (positive) tolerance of a step's error, component by component,
-        in the state's units.
+        Relative (at least 1e-15) and absolute (positive) tolerance of a step's error. They hold for each
+        component, in its unit.
     max_step : float, optional
-        The longest step; by default only the error limits it. Without it a smooth pulse that is shorter than
+        The longest step. By default only the error limits it. Without it a smooth pulse that is shorter than
         a step can be missed.
     method : {"auto", "dopri5", "dop853", "taylor", "rodas"}
-        ``"auto"`` takes the fastest, as measured: the power series where the law has one, with ``"dop853"``
-        for a run where it does not serve, as next to a pole, and ``"rodas"`` for one of a model of your own
-        that turns out to be stiff. ``run.stats.method`` says which one ran. ``"dopri5"`` is Dormand &
+        ``"auto"`` takes the fastest, as measured. This is the power series if the law has one, and
+        ``"dop853"`` if the series fails, as next to a pole. It is ``"rodas"`` for a model of your own that
+        turns out to be stiff. ``run.stats.method`` says which one ran. ``"dopri5"`` is Dormand &
         Prince's method of order 5(4), with dense output of order 4; ``"dop853"`` is theirs of order 8(5, 3),
         with dense output of order 7, for tight tolerances. ``"taylor"`` follows the solution's power series
         to order 10 or 18, by the tolerance; its dense output is as accurate as its steps. ``"rodas"`` is the
         Rosenbrock method Rodas5P of order 5(4), with dense output of order 4, for stiff laws. All land on the
         surfaces where the law changes.
     dense : bool
-        Whether to keep the polynomials of all steps, so that the trajectory can be called with any times.
+        If True, the polynomials of all steps are kept, and the trajectory can be called with any times.
     inputs : mapping of str to InputSignal or array_like, optional
-        The signal of each of the model's measured inputs; samples without times belong to the times `t`. The
-        steps land on the samples where the signal has a kink.
+        The signal of each measured input of the model. Samples without times belong to the times `t`. The
+        steps land on the samples at which the signal has a kink.
 
     Returns
     -------

@@ -25,11 +25,12 @@ def page(
     video : path
         The film that was tracked.
     found : Measurement or Tracking
-        What was made of it; a `Tracking` also shows how far each mark was off in each part of the picture.
+        Result of the tracker. With a `Tracking` the page also shows the errors of the marks in each part of
+        the picture.
     path : path
-        Of the page (HTML); an older one is replaced once the new one is complete.
+        HTML file to write. An older one is replaced when the new one is complete.
     command : str, optional
-        How it was made.
+        Command that made the measurement, for display.
 
     Raises
     ------

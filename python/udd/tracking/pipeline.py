@@ -110,33 +110,35 @@ def track(
     ----------
     video : path
         A film by a camera at rest, or a folder of its pictures by number (then give `fps`). It shows the
-        whole disk with square marks red, orange, blue,
-        green (clockwise) near its rim, or with those of `layout`.
+        whole disk, with square marks near its rim in red, orange, blue and green (clockwise), or with the
+        marks of `layout`.
     disk_radius : float, optional
-        Radius of the disk [m], 0.08 if not given; with the marks' distance it sets the scale.
+        Radius of the disk [m]. The default is 0.08. With the distance of the marks it sets the scale.
     fps : float or sequence of (int, float), optional
-        Frames per second, if the film's header is wrong (slow motion), or pairs of a frame's number and the
-        rate from it on, the first frame being 0: ``[(0, 30), (61, 240), (301, 30)]``.
+        Frames per second, if the film's header is wrong (slow motion). Pairs of a frame's number and the rate
+        from this frame on are also possible: ``[(0, 30), (61, 240), (301, 30)]``. The first frame is 0.
     pivot : (u, v), optional
         The contact of wheel and disk in the picture [pixels, v down]. Found from the motion if not given.
     refine : bool, optional
-        Go over the film a second time, with each frame's blur known from its neighbours; so if not given.
+        If True (the default), go over the film a second time. The blur of each frame then follows from its
+        neighbours.
     layout : sequence of mappings, optional
-        Marks of another disk, two or more: ``{"at": [y, z], "colour": "red"}``, with the place [m] when
-        beta = 0 and the colour by name or as sRGB codes ``[r, g, b]``. Square or rectangular patches, each
-        with a margin of the disk about it. Or printed tags, one or more of one dictionary:
+        Two or more marks of another disk: ``{"at": [y, z], "colour": "red"}``, with the place [m] at
+        beta = 0. The colour is a name or has sRGB codes ``[r, g, b]``. Marks are square or rectangular
+        patches, with a margin of the disk around each. Or printed tags, one or more of one dictionary:
         ``{"tag": "4x4_50:7", "at": [y, z], "side": 0.03}``, upright at beta = 0.
     scale : float, optional
-        Pixels per metre in the disk's plane, given instead of found.
+        Pixels per metre in the plane of the disk. Estimated from the film if not given.
     calibrate : mapping, optional
-        Items to calibrate: ``layout, scale, lens, tilt, readout, exposure, pivot``. True: from the film (the
-        default); False: as given, or absent; a number (lens, readout [s], exposure [s]): that value.
+        Items to calibrate: ``layout, scale, lens, tilt, readout, exposure, pivot``. True (the default)
+        estimates an item from the film. False takes it as given, or as absent. A number (lens, readout [s],
+        exposure [s]) sets it.
     bob : str, (r, g, b) or two of these, optional
-        The film is one of a plain pendulum with a bob of this colour: ``theta`` is measured, from the
-        picture's vertical, about the centre of the bob's path (or `pivot`). Two colours, the upper bob
-        first: a double pendulum, ``th1`` and ``th2`` from the vertical.
+        Colour of the bob, if the film shows a plain pendulum. Then ``theta`` is measured from the picture's
+        vertical, about the centre of the bob's path (or `pivot`). Two colours, the upper bob first, mean a
+        double pendulum. Then ``th1`` and ``th2`` are measured from the vertical.
     config : path, mapping or TrackOptions, optional
-        A TOML file (or its entries) with any of these arguments; arguments given here win.
+        A TOML file (or its entries) with any of these arguments. Arguments of the call take precedence.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.
@@ -155,10 +157,10 @@ def track(
     Returns
     -------
     Measurement
-        ``Y, Z`` [m], ``beta`` [rad, unwrapped] at mid-exposure with standard errors and correlations,
-        one row per frame; a frame that cannot be used holds NaN and says why in ``flag`` (``dup``,
-        ``black``, ``damaged``, ``vague``, ``lost``, ``gone``); ``gap`` (frames are missing before it) and
-        ``degraded`` are remarks. ``quality`` holds number of marks, completeness, residual, blur and
+        One row per frame: ``Y, Z`` [m] and ``beta`` [rad, unwrapped] at mid-exposure, with standard errors
+        and correlations. A frame that cannot be used holds NaN, with the reason in ``flag`` (``dup``,
+        ``black``, ``damaged``, ``vague``, ``lost``, ``gone``). The flags ``gap`` (frames are missing before
+        it) and ``degraded`` are remarks. ``quality`` holds number of marks, completeness, residual, blur and
         method of each frame. ``meta`` holds the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``,
         ``exposure``, ..., and in ``calibration`` every item as value, standard error and how it is known.
 

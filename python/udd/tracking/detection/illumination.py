@@ -14,12 +14,12 @@ from .colour_blobs import Sight
 from .occluder import bare
 
 Array = NDArray[np.float64]
-EVERY = 3  # pixels: neighbours tell the same
-FEWEST = 200  # pixels of a picture
-MOST = 60  # pictures
-FAR = 0.3  # relative difference from a picture's middle light that is no bare disk
-SIGMAS = 3.0  # beyond which a pixel shows something else
-LEAST = 0.01  # relative change of light over the disk's way that moves no mark by as much as noise does
+EVERY = 3  # Pixels: neighbours give the same information.
+FEWEST = 200  # Pixels of a picture.
+MOST = 60  # Pictures.
+FAR = 0.3  # Relative difference from a picture's median light that is no bare disk.
+SIGMAS = 3.0  # Standard deviations of a pixel that shows something else.
+LEAST = 0.01  # Relative change of light over the disk's way: a smaller one moves marks by less than noise.
 
 
 def evenness(

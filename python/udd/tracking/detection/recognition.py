@@ -20,15 +20,15 @@ from .layout_matching import sightings as matching
 from .still_patches import split
 from .survey import Survey, slowest
 
-SAME_PLACE = 1.5  # pixels: apparent motion of a thing at rest
-SAME_ANGLE = 0.03  # rad by which it may seem to turn
-OFTEN = 0.3  # share of the sights in one place from which on the others are looked for
-ALWAYS = 0.95  # share of them from which on what is seen never moves
-COARSE = 4  # pixels of the pictures that are compared, along each side
-CHANGED = 14.0  # codes by which light changes where something moves
-LARGE = 0.25  # of the disk's area: what moves beside it
-MARGIN = 1.0  # of a mark's side: what is left out about the middle of one that is not the disk's
-WAY = 1.5  # of the marks' reach: what is the disk's
+SAME_PLACE = 1.5  # Pixels: apparent motion of a thing at rest.
+SAME_ANGLE = 0.03  # Apparent rotation of a thing at rest, in rad.
+OFTEN = 0.3  # Share of the sights in one place above which the other sights are searched.
+ALWAYS = 0.95  # Share of them above which the object never moves.
+COARSE = 4  # Pixels of the pictures that are compared, along each side.
+CHANGED = 14.0  # Codes by which light changes if something moves.
+LARGE = 0.25  # Share of the disk's area: larger moving things are another object.
+MARGIN = 1.0  # Part of a mark's side that is left out around a mark of another object.
+WAY = 1.5  # Times the marks' reach: marks within it belong to the disk.
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,15 @@ from udd.markers.layout import PALEST
 from udd.video.reader import Picture
 from udd.video.rgb_frames import rgb
 
-CLICK = 1.5  # pixels by which a hand misses, in each direction, where the screen shows each pixel
-FOUND = 0.3  # pixels by which a patch's middle misses its mark's: colours have half the resolution
-ALIKE = 0.94  # cosine between the directions of a pixel's colour and the patch's: 20 degrees
-HALF = 0.5  # of the colour's strength: where a pixel is half patch, half disk
-SMALLEST = 6  # half-resolution pixels of a patch that is one
-LARGEST = 0.05  # of the picture: what has more is a wall, no mark
-FULL = 0.74  # of the smallest rectangle about it that a square or rectangular mark fills, coarse as it is
-DARK = 0.5  # of the usual brightness about a patch: below, something stands there that is not the disk
-HIDDEN = 0.1  # of what is about a patch that is dark where the mark is hidden in part
+CLICK = 1.5  # Pixels by which a hand misses in each direction, if the screen shows each pixel.
+FOUND = 0.3  # Error of a patch's middle in pixels: colours have half the resolution.
+ALIKE = 0.94  # Cosine between the directions of a pixel's colour and the patch's: 20 degrees.
+HALF = 0.5  # Share of the colour's strength in a pixel that is half patch, half disk.
+SMALLEST = 6  # Least half-resolution pixels of a patch.
+LARGEST = 0.05  # Share of the picture: a larger patch is a wall.
+FULL = 0.74  # Share of its smallest rectangle that a mark fills at this coarse resolution.
+DARK = 0.5  # Share of the usual brightness around a patch: darker pixels show another object.
+HIDDEN = 0.1  # Share of dark pixels around a patch if the mark is partly hidden.
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class Pixels:
     rim : ndarray, shape (n, 73, 2)
         A closed line along the rim.
     radius : float
-        Radius of the disk.
+        Radius of the disk [pixels].
     pivot : ndarray, shape (2,)
         The contact.
     scale : float

@@ -13,9 +13,9 @@ from udd.tracking.passes.tracks import Tracks
 from .streak_errors import mark_residuals, new_poses, unit_covariance
 
 Array = NDArray[np.float64]
-OUTLIER = 6.0  # times the usual disagreement; a frame beyond does not count for the others
-ALIKE = 1000.0  # coordinates that stand for a usual frame where frames differ by no more than chance
-GROUP = 40  # frames with like streaks from which their usual disagreement is taken
+OUTLIER = 6.0  # Times the usual disagreement. A frame beyond does not count for the others.
+ALIKE = 1000.0  # Weight of a usual frame, in coordinates, if frames differ by no more than chance.
+GROUP = 40  # Frames with similar streaks that give the usual disagreement.
 
 
 def covariance(tracks: Tracks, look: DiskAppearance) -> Array:

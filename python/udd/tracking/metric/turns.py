@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 Array = NDArray[np.float64]
-SHORT = 3.5  # usual intervals: in a shorter gap no turn is lost
-SIDE, NEAR = 4, 0.12  # frames, and seconds, on each side that show the rate of turning
-STEP = 0.08  # s over which accelerations are compared; shorter ones are noise
-MEMORY = 0.15  # s for which an acceleration lasts, about
-SURE = 16.0  # decrease of chi2 against the next best number of turns
-ODD = 12.0  # chi2 for each acceleration beyond which none explains the gap
-PLACE, SLIP = 0.01, 0.04  # of the marks' reach, of the way driven: by how much a disk may miss its place
-SHAPES = 4  # by which the angle may differ from a cubic
+SHORT = 3.5  # Usual intervals: in a shorter gap no turn is lost.
+SIDE, NEAR = 4, 0.12  # Frames, and seconds, on each side that show the rate of rotation.
+STEP = 0.08  # Time in s over which accelerations are compared. Shorter ones are noise.
+MEMORY = 0.15  # Typical duration of an acceleration in s.
+SURE = 16.0  # Decrease of chi2 against the next best number of turns.
+ODD = 12.0  # Value of chi2 per acceleration above which no number explains the gap.
+PLACE, SLIP = 0.01, 0.04  # Error of the disk's place, in the marks' reach and in the way driven.
+SHAPES = 4  # Shapes by which the angle may differ from a cubic.
 SAMPLES = 25
-LONG = 1.0  # s: across a longer gap too many ways are as good
-MOST = 12  # turns more or less that are tried
-LEAST = 3.0  # rad/s^2: no disk turns more evenly
+LONG = 1.0  # Seconds: across a longer gap too many paths fit equally well.
+MOST = 12  # Turns more or less that are tried.
+LEAST = 3.0  # Acceleration in rad/s^2: no disk rotates more evenly.
 
 
 @dataclass(frozen=True)
