@@ -21,24 +21,24 @@ PAPER_PIVOT = (275.0, 330.0)
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera that looks straight at the disk.
+    """Camera that looks straight at the disk.
 
     Pixel coordinates (x, y) have x to the right and y down, and the centre of the top left pixel at (0, 0).
 
     Attributes
     ----------
     size : (int, int)
-        Width and height of the picture in pixels, both even.
+        Width and height of the picture in pixels. Both are even.
     scale : float
         Pixels per metre.
     pivot : (float, float)
         Pixel at which the wheels hold the disk.
     tilt : float
-        Angle in rad by which everything in the picture is turned clockwise.
+        Clockwise rotation of the whole picture, in rad.
     rate : Fraction
         Frames per second.
     exposure : float
-        Time in s for which the shutter is open, at most one frame.
+        Time in s for which the shutter is open. It is at most the time of a frame.
     """
 
     size: tuple[int, int]

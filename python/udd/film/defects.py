@@ -38,7 +38,7 @@ class Defects:
     lens : float
         Radial distortion: relative displacement at the picture's corner, above 0 for barrel.
     readout : float
-        Share of a frame that a rolling shutter takes from the first row to the last; the time of a frame is
+        Share of a frame that a rolling shutter takes from the first row to the last. The time of a frame is
         that of its middle row.
     gradient : float
         Relative change of the light from the picture's left edge to its right.
@@ -51,7 +51,7 @@ class Defects:
     mark_strength : sequence of four float
         Strength of each mark's colour: 1 for full colour. It is 0 for a mark that fell off.
     dropped : sequence of int
-        Frames left out of the file; the time stamps of the others stay.
+        Frames left out of the file. The time stamps of the others stay.
     repeated : sequence of int
         Frames that the file shows as copies of those before them.
     black : sequence of int

@@ -44,14 +44,14 @@ class Film(Drawable):
     path : Path
         The film file.
     t : ndarray, shape (n,)
-        Time of the middle of each frame's exposure, s: of frame k that is k / fps, which is also its stamp in
-        the file unless the defect `clock` slows a part of the film down.
+        Time of the middle of each frame's exposure, s. For frame k it is k / fps. The file has the same time
+        stamps, unless the defect `clock` slows a part of the film down.
     state : ndarray, shape (n, 4)
         [Omega, Y, Z, beta] of the disk in the middle of each exposure, rad/s, m, m, rad.
     held : ndarray of bool, shape (n,)
-        Whether the wheels hold the disk; where not, it falls freely.
+        True if the wheels hold the disk. Otherwise it falls freely.
     size : (int, int)
-        Width and height, pixels.
+        Width and height of the picture, in pixels.
     scale : float
         Pixels per metre.
     pivot : (float, float)
@@ -125,14 +125,15 @@ def render(
     path : path-like
         File to write, ``.mp4`` or ``.mov``. An older film is replaced once the new one is complete.
     support : float
-        Width of the black support relative to the real one (26 mm for R = 0.08 m); 0 films the disk alone.
+        Width of the black support relative to the real one (26 mm for R = 0.08 m). With 0 the disk is filmed alone.
     background : array_like, optional
         Background: a picture (height, width, 3) of codes 0 to 255 in red, green, blue, or a colour (3,). The
         default is a grey wall and a table.
     noise : float
         Standard deviation of the sensor noise, in codes of 255.
     quality : float
-        H.264's constant rate factor: 0 is lossless but for the colours' coarser grid, 20 good, 35 poor.
+        H.264's constant rate factor: 20 is good, and 35 is poor. With 0 only the coarser grid of the colours
+        loses information.
     codec : str
         ``"h264"``, ``"hevc"``, or ``"mp4v"`` for MPEG-4 as OpenCV's ``VideoWriter`` writes it (without a
         choice of quality).
@@ -141,7 +142,7 @@ def render(
         dropped frames. By default there are none.
     layout : sequence of mappings, optional
         Square marks instead of the four: ``{"at": [y, z], "colour": "red"}`` or ``{"at": [y, z], "tag":
-        "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given); sides upright at beta = 0.
+        "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given). Sides are upright at beta = 0.
     rng : int, Generator or None
         Random generator of the noise. The same whole number gives the same film; None takes fresh entropy.
     progress : bool or callable, optional
@@ -163,8 +164,8 @@ def render(
     Raises
     ------
     UddError
-        For a trajectory that is empty, not finite or too coarsely sampled, an exposure longer than a frame, a
-        place that cannot be written to, any other value out of its range, or without the extra ``track``.
+        The trajectory is empty, not finite or too coarsely sampled. A value is out of its range, such as an
+        exposure longer than a frame. The file cannot be written, or the extra ``track`` is not installed.
         Nothing is left behind then.
 
     See Also
