@@ -125,7 +125,8 @@ def render(
     path : path-like
         File to write, ``.mp4`` or ``.mov``. An older film is replaced once the new one is complete.
     support : float
-        Width of the black support relative to the real one (26 mm for R = 0.08 m). With 0 the disk is filmed alone.
+        Width of the black support relative to the real one (26 mm for R = 0.08 m). With 0 the disk is filmed
+        alone.
     background : array_like, optional
         Background: a picture (height, width, 3) of codes 0 to 255 in red, green, blue, or a colour (3,). The
         default is a grey wall and a table.
@@ -142,7 +143,8 @@ def render(
         dropped frames. By default there are none.
     layout : sequence of mappings, optional
         Square marks instead of the four: ``{"at": [y, z], "colour": "red"}`` or ``{"at": [y, z], "tag":
-        "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given). Sides are upright at beta = 0.
+        "4x4_50:7"}`` as for `udd.track`, with ``"side"`` in m (R/5 if not given).
+        Sides are upright at beta = 0.
     rng : int, Generator or None
         Random generator of the noise. The same whole number gives the same film; None takes fresh entropy.
     progress : bool or callable, optional
