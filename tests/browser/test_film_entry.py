@@ -58,6 +58,11 @@ def test_a_phone_needs_a_length_alone(opened: Opened) -> None:
         "",
     ]
     assert why(opened).startswith("Say the length")
+    page.fill("#loop-length", "0.8")
+    assert why(opened) == "Length of the pendulum is 0.8 in centimetres. Was it measured in metres?"
+    assert "waiting" not in page.get_attribute("#go", "class")
+    page.fill("#loop-length", "80")
+    assert why(opened) == ""
 
 
 def test_a_driven_pendulum_goes_from_its_table_to_the_verdict(opened: Opened) -> None:

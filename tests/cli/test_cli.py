@@ -862,3 +862,27 @@ def test_a_help_imports_no_numbers() -> None:
         [sys.executable, "-S", "-c", code], env=environment, capture_output=True, text=True
     )
     assert answer.stdout == "[]\n", answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["simulate", "--W", "4.2", "--t", "0.1"], "W is 4.2 m/s; expected about 0.04 m/s. Is it in cm/s?"),
+        (
+            ["simulate", "--W", "0.042", "--R", "8", "--t", "0.1"],
+            "R is 8 m; expected about 0.08 m. Is it in cm?",
+        ),
+        (
+            ["simulate", "--pendulum", "65", "--t", "0.1"],
+            "length is 65 m; expected at most 10 m. Is it in cm?",
+        ),
+        (["simulate", "--pendulum", "0.65", "--t", "0.1"], ""),
+        (["simulate", "--W", "0.042", "--t", "0.1"], ""),
+    ],
+)
+def test_numbers_in_centimetres_are_doubted(
+    args: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(args) == 0
+    err = capsys.readouterr().err
+    assert words in err and (words or "Is it in" not in err)

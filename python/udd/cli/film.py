@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> CommandResult:
         progress=shown_progress(),
     )
     left = ", until the disk leaves the wheels" if trajectory.outcome == "ejected" else ""
-    text = f"{made.path}: {len(made.t)} frames, {made.t[-1]:.2f} s{left}"
+    text = f"{made.path}: {len(made.t)} {'frame' if len(made.t) == 1 else 'frames'}, {made.t[-1]:.2f} s{left}"
     data = {"file": made.path, "frames": len(made.t), "outcome": trajectory.outcome, "model": repr(model)}
     return CommandResult(text, data)
 

@@ -114,15 +114,26 @@ def refuse_others(args: argparse.Namespace, kind: str, where: str = "") -> None:
         raise UddError(f"{where}{option} does not apply to {_KINDS[kind]}")
 
 
-_FAST = 0.5  # m/s: the device's drive is a tenth of that, and W in cm/s a hundred times more
+# Numbers in cm are a hundred times those in m: between the two are these.
+_FAST = 0.5  # m/s: the device's drive is a tenth of that
+_WIDE = 1.0  # m: radius of a disk; the device's is 0.08 m
+_LONG = 10.0  # m: length of a pendulum
+
+
+def _doubt(name: str, value: float, most: float, unit: str, usual: str) -> None:
+    """Warn of a number that seems to be in centimetres."""
+    if value > most:
+        centimetres = unit.replace("m", "cm")
+        text = f"{name} is {value:g} {unit}; expected {usual}. Is it in {centimetres}?"
+        warnings.warn(text, UserWarning, stacklevel=3)
 
 
 def disk(args: argparse.Namespace, W: float, R: float) -> Disk:
     """The disk that the options describe."""
     from udd.models import Disk
 
-    if W > _FAST:
-        warnings.warn(f"W is {W:g} m/s; expected about 0.04 m/s. Is it in cm/s?", UserWarning, stacklevel=2)
+    _doubt("W", W, _FAST, "m/s", "about 0.04 m/s")
+    _doubt("R", R, _WIDE, "m", "about 0.08 m")
     return Disk(W, R=R, effects=effects(args.effect), **given(args, "g", "k0", "k1", "k2"))
 
 
@@ -130,6 +141,7 @@ def pendulum(args: argparse.Namespace, length: float, inertia: float | None) -> 
     """The pendulum that the options describe."""
     from udd.models import Pendulum
 
+    _doubt("length", length, _LONG, "m", f"at most {_LONG:g} m")
     return Pendulum(length, inertia=inertia, effects=effects(args.effect), **given(args, "g", "k0"))
 
 

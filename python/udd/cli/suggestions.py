@@ -6,7 +6,13 @@ import difflib
 from collections.abc import Iterable
 
 
-def meant(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean X?" with the nearest known word, or nothing if none is near."""
-    near = difflib.get_close_matches(word, list(known), 1, 0.6)
+def meant(word: str, choices: Iterable[str]) -> str:
+    """Return "; did you mean X?" with the nearest choice, or nothing if none is near.
+
+    >>> meant("--w", ["--g", "--W"]), meant("quit", ["fit"]), meant("fut", ["fit"])
+    ('; did you mean --W?', '', '; did you mean fit?')
+    """
+    every = list(choices)
+    same = [choice for choice in every if choice.casefold() == word.casefold()]
+    near = same or difflib.get_close_matches(word, every, 1, 0.6)
     return f"; did you mean {near[0]}?" if near else ""

@@ -120,6 +120,16 @@ export class Loop {
     return this.said("length") || this.table.meta.length !== null ? "" : t("why_length");
   }
 
+  /** What seems to be in metres instead of centimetres; "" if nothing. */
+  get doubt() {
+    const least = { W: 0.2, R: 0.5, length: 2 };
+    const name = Object.keys(least).find((key) => {
+      const { value } = this.fields[key];
+      return value > 0 && value < least[key];
+    });
+    return name ? t("doubt_metres", { name: t(`loop_${name}`).replace(/ \[.*/, ""), value: this.fields[name].value }) : "";
+  }
+
   said(name) {
     return this.fields[name].input.value.trim() !== "";
   }
@@ -127,7 +137,7 @@ export class Loop {
   /** Say beside the button what is missing. */
   tell() {
     const { why } = this;
-    $("why").textContent = why;
+    $("why").textContent = why || this.doubt;
     $("go").classList.toggle("waiting", why !== "");
   }
 
