@@ -64,3 +64,14 @@ def test_attributes_and_modules_of_before_work_with_a_warning(monkeypatch: pytes
     with pytest.warns(DeprecationWarning, match="called udd.related_systems now"):
         again = importlib.import_module("udd.relatives")
     assert again.lorenz is udd.related_systems.lorenz
+
+
+def test_an_unknown_argument_is_answered_with_all_that_there_are() -> None:
+    with pytest.raises(TypeError, match=r"'state0'; its arguments are model, .*initial_states, .*rtol"):
+        udd.bifurcation(udd.DLE(1.0), "w", [1.0, 2.0], state0=[1, 1, 0])
+
+
+def test_a_model_without_a_usual_state_names_the_argument() -> None:
+    swing = udd.Model(["x", "v"], {"x": "v", "v": "-x"}, {})
+    with pytest.raises(udd.errors.ModelError, match="give state0="):
+        udd.lyapunov(swing)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec, TypeVar, cast
@@ -61,8 +62,10 @@ def with_defaults(function: str, defaults: Options, given: Mapping[str, Any]) ->
     """
     for name in given:
         if name not in defaults:
+            code = sys._getframe(1).f_code  # of the function
+            own = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
             raise TypeError(
-                f"{function}() got an unexpected keyword argument {name!r}; those that it shares with other "
-                f"functions are {', '.join(defaults)}"
+                f"{function}() got an unexpected keyword argument {name!r}; its arguments are "
+                f"{', '.join([*own, *defaults])}"
             )
     return cast(Options, {**defaults, **given})

@@ -17,6 +17,7 @@ from udd._util.labelled import dataset
 from udd._util.memory import require_memory
 from udd._util.one_line import OneLine
 from udd._util.validation import number, whole
+from udd._util.value_text import with_error
 from udd.errors import ConvergenceWarning, IntegrationError
 from udd.models import DLE, Model, require_model
 from udd.models.parameter_batch import default_state
@@ -122,7 +123,7 @@ class Spectrum(Drawable):
 
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.standard_errors, strict=True)
-        values = ", ".join(f"{value:.5g}({error:.1g})" for value, error in pairs)
+        values = ", ".join(with_error(value, error) for value, error in pairs)
         after = f" after a transient of {self.transient:.4g}" if self.transient else ""
         return (
             f"<Spectrum of {self.model!r}: {values}; {self.verdict}{after}, dimension {self.dimension:.4g}>"

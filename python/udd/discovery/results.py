@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from udd._util.drawable import Drawable
 from udd._util.keywords import renamed_attribute
-from udd._util.one_line import OneLine
+from udd._util.one_line import OneLine, cut
 from udd._util.value_text import with_error
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
@@ -79,6 +80,14 @@ class AddedEffect(OneLine):
     is_law: bool = True
     tried: str = ""
     by_record: list[RecordAnswer] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """Describe the effect on one line."""
+        values = ", ".join(
+            f"{name} = {with_error(v, self.errors.get(name))}" for name, v in self.parameters.items()
+        )
+        text = f"<AddedEffect {self.title}: {self.equation}, {values}; chi2 decreased by {self.chi2:.4g}>"
+        return cut(text, 300)
 
     def like_a_drift(self, model: Model) -> bool:
         """Return True for a curve over time alone, which may be the drift of a sensor's zero.
@@ -193,7 +202,7 @@ class RejectedEffect(OneLine):
 
 
 @dataclass(frozen=True)
-class Discovery:
+class Discovery(Drawable):
     """Result of :func:`udd.discover`: the terms that a model lacks, with the evidence.
 
     Attributes

@@ -359,7 +359,10 @@ class Fit(Drawable):
         """Describe the fit in one line; :meth:`summary` says more."""
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in list(self.parameters.items())[:4])
         more = ", ..." if len(self.parameters) > 4 else ""
-        kinds = ", ".join(dict.fromkeys(type(model).__name__ for model in self.models))
+        written = [
+            "Model" if isinstance(model, FormulaModel) else type(model).__name__ for model in self.models
+        ]
+        kinds = ", ".join(dict.fromkeys(written))
         return f"<Fit of {kinds}: {self._state}; {numbers}{more}>"
 
     def _repr_html_(self) -> str:

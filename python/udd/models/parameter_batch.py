@@ -20,7 +20,10 @@ def default_state(model: Model) -> list[float]:
     """Return an initial state from which orbits reach the main attractor."""
     start = model.profile.dynamics.start
     if start is None:
-        raise ModelError("where orbits of a model of your own start is yours to say: give an initial state")
+        raise ModelError(
+            "a model of your own has no usual initial state: give state0=[...], or for a bifurcation diagram "
+            "initial_states=[[...]]"
+        )
     return [*start, *[0.0] * (len(model.state_names) - len(start))]  # bristles are at rest
 
 
