@@ -13,6 +13,7 @@ import pytest
 import udd
 from udd.discovery import hypotheses
 from udd.discovery.hypotheses import Hypothesis, contains, log_evidence, log_prior, named, ranked, rivals
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.results import AddedEffect
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.symbolic.expressions import is_single_term, length, read
@@ -285,6 +286,10 @@ def test_unit_information_has_a_covariance():
         covariance=np.ones((2, 2)),
         widened=1.0,
         observations=99,
+        level=4,
+        problem=SimpleNamespace(schedule=range(5)),
     )
     assert log_evidence(fit, ["a", "b"]) == -math.inf
     assert hypotheses.log_evidence(fit, []) == 5.0
+    fit.level = 3
+    assert hypotheses.log_evidence(fit, []) == 5.0 - EVIDENCE_MARGIN  # a random force

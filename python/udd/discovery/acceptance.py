@@ -24,7 +24,17 @@ from udd.discovery.validation.held_out_errors import (
 )
 from udd.discovery.validation.sensor_drift import drift_gain
 from udd.errors import FitError
-from udd.fitting import Fit, Record, at_level, eased, far_off, ran_away, refit, released_anew, started_at
+from udd.fitting import (
+    Fit,
+    Record,
+    at_level,
+    eased,
+    far_off,
+    most_probable,
+    ran_away,
+    released_anew,
+    started_at,
+)
 from udd.fitting.parameters import Free
 
 from .hypotheses import Hypothesis, log_evidence, log_prior, named, ranked, rivals, spent
@@ -269,8 +279,8 @@ class Acceptance:
         return result + wholes(self._shortened(current, ranked(result)))
 
     def _at_own_noise(self, fitted: Fit) -> Fit:
-        """Refit at the fit's own noise and model error, with all the user's free parameters."""
-        return refit(self._all_free(fitted), trusted=True)
+        """Refit at the most probable noise and model error, with all the user's free parameters."""
+        return most_probable(self._all_free(fitted))
 
     def _written(self, current: SearchState, order: Sequence[Hypothesis]) -> list[TrialFit]:
         """Return formulas for the likely splines, as fitted to all data.

@@ -22,13 +22,22 @@ from .continuous import continuous
 from .estimator_input import FilmParameters
 from .formula_models import driven, levels_of
 from .input_noise import LEVEL_RATIO, diffusion_by_noise
-from .model_error_schedule import ANY, FEW, LEAP, ROUGH, Goal, provisional_fit, reduce_model_error
+from .model_error_schedule import (
+    ANY,
+    FEW,
+    LEAP,
+    ROUGH,
+    Goal,
+    eased,
+    provisional_fit,
+    reduce_model_error,
+)
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera, names_of
 from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .sensor import is_encoder
-from .solve import MOST, SolveError, solve
+from .solve import MOST, SolveError, done, solve
 from .units import Scale, ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
@@ -487,25 +496,45 @@ def _with_free(fitted: Fit, free: Sequence[Free]) -> Problem:
     return replace(fitted.problem, free=(*free, *added))
 
 
-def refit(fitted: Fit, *, trusted: bool = False) -> Fit:
-    """Fit the same model again with new noise, at the most probable model error.
+def refit(fitted: Fit) -> Fit:
+    """Fit the same model again with new noise, at the most probable smaller model error.
 
     In a search the noise stays that of the first model, so that chi2 can be compared. The noise of a film
-    stays at its assumed value unless the geometry is `trusted`.
+    stays at its assumed value.
     """
+    return _tightened(fitted, trusted=not _least(fitted.measurements, search=True) > _FINEST)
+
+
+def most_probable(fitted: Fit) -> Fit:
+    """Fit the same model at its most probable noise and model error, smaller or larger."""
+    tightest = _tightened(fitted, trusted=True)
+    result = eased(tightest)
+    # Without this, one form is compared at its most probable model error, another 180 nats below its own.
+    if result.level < tightest.level:
+        try:
+            result = solve(fitted.measurements, *_own_noise(result), decrease=done(result))
+        except SolveError:
+            return tightest
+    return result if result.converged else tightest
+
+
+def _tightened(fitted: Fit, trusted: bool) -> Fit:
+    """Reduce the model error to the most probable one, with the fit's own noise if that is `trusted`."""
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
-    problem = replace(fitted.problem, schedule=schedule, likeliest=True)
-    misfits: Misfits = "little"
-    point = fitted.point
+    fitted = replace(fitted, problem=replace(fitted.problem, schedule=schedule))
     try:
-        if trusted or not _least(fitted.measurements, search=True) > _FINEST:
-            misfits, problem, point = _estimate_noise(fitted.measurements, problem, point)
-        if misfits != "noise":
-            problem, point = replace(fitted.problem, schedule=problem.schedule), fitted.point
-        result = reduce_model_error(fitted.measurements, problem, point, problem.schedule[fitted.level :])
+        problem, point = _own_noise(fitted) if trusted else (fitted.problem, fitted.point)
+        result = reduce_model_error(fitted.measurements, problem, point, schedule[fitted.level :])
     except SolveError:  # for example, a threshold that ends at or below zero
         return fitted
     return result if result.converged else fitted
+
+
+def _own_noise(fitted: Fit) -> tuple[Problem, Point]:
+    """Estimate the noise at a fit's model error; keep it where the misfits do not show it."""
+    problem = replace(fitted.problem, likeliest=True)
+    misfits, problem, point = _estimate_noise(fitted.measurements, problem, fitted.point)
+    return (problem, point) if misfits == "noise" else (fitted.problem, fitted.point)
 
 
 def _anneal(measurements: tuple[Measurement, ...], problem: Problem, point: Point) -> Fit:
