@@ -458,7 +458,7 @@ def test_a_located_curve_is_fitted_in_full():
     assert fitted.converged
     # All its constants were free, and it explains the data as well, for less.
     assert {f"formula.{p}" for p in best.parameters} <= set(fitted.parameters)
-    assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < result.fit.chi2 / 2 + result.price
+    assert fitted.chi2 / 2 + np.log(4500) / 2 * len(best.parameters) < result.fit.chi2 / 2 + result.cost
 
 
 @pytest.mark.nightly  # so far from the known model it depends on the last bits whether a fit is found

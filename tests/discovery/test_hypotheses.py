@@ -41,7 +41,7 @@ class Trial:
     names: list[str]
     formula: Any = None
     curve: Any = None
-    price: float = 0.0
+    cost: float = 0.0
 
     @property
     def is_curve(self) -> bool:

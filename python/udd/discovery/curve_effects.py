@@ -43,14 +43,14 @@ class CurveFit(OneLine):
         Fit whose model has the curve as its last effect.
     curve : Curve
         The fitted curve; its band excludes the part confounded with the model's other parameters.
-    price : float
+    cost : float
         Cost of the curve's freedom, nats: the counterpart of half a parameter's log count of numbers in the
         Bayesian information criterion.
     """
 
     fit: Fit
     curve: Curve
-    price: float
+    cost: float
 
     @property
     def effect(self) -> Effect:
@@ -125,10 +125,10 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve") -> CurveFit:
     curve, at, score = replace(here.curve, coefficients=here.at), here.at, here.curve.score
     fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, done(here.fit))
     gain = float(score.gradient @ at - at @ score.information @ at / 2)
-    price = gain - curve.evidence
-    if not settled:  # while the curve still moves, its gain here does not determine its price
-        price = max(price, curve.df * math.log(fit.observations) / 2)
-    return CurveFit(fitted, identifiable_part(curve, fitted), price)
+    cost = gain - curve.evidence
+    if not settled:  # while the curve still moves, its gain here does not determine its cost
+        cost = max(cost, curve.df * math.log(fit.observations) / 2)
+    return CurveFit(fitted, identifiable_part(curve, fitted), cost)
 
 
 @dataclass(frozen=True)

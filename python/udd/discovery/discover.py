@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from udd._util import background_import
 from udd._util.arguments import checked_arguments
@@ -36,6 +37,7 @@ from udd.fitting import (
     record_of,
     refit,
 )
+from udd.fitting.record import Record
 from udd.fitting.solve import SolveError
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
@@ -45,7 +47,7 @@ from udd.models.formula_model import FormulaModel
 
 from .acceptance import Acceptance, SearchState, Step
 from .results import AddedEffect, Discovery, RejectedEffect
-from .search import Search, map_fits
+from .search import Outcome, Search, map_fits
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
@@ -171,95 +173,148 @@ def discover(
     assert callable(progress)
     clock = Clock(budget, progress)
     options = options_of(free, camera, priors, each)
-    record_order, held_out_count = _held_out(measurement, held_out)
-    if held_out_count and (each is not None or any("[" in name for name in priors or {})):
+    data = _prepared(measurement, model, state0, held_out)
+    if data.held_out and (each is not None or any("[" in name for name in priors or {})):
         raise FitError(
             "held_out cannot be used with each, or with priors of single records: "
             "the parameters of a held-out record would be undetermined"
         )
-    if held_out_count:
-        measurement, model, state0 = (
-            _ordered(given_item, record_order) for given_item in (measurement, model, state0)
-        )
+    given = _given(_first(model), candidates)
+    clock.finish("fitting the known model")
+    background_import.importing("scipy.stats", "pyoperon.sklearn")
+    part, whole, constrained = _known_model(data, options)
+    tests = Acceptance(data.record, ~data.train, clock, motion_time_scale(part), part.problem.free)
+    known = SearchState(part, whole, tests.errors(part))
+    search = Search(tests, given)
+    begin = _begin(search, known)
+    end = search.run(begin, known)
+    clock.finish("fitting the model as found")
+    return _answer(data, known, begin, search, end, constrained)
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Measurements of a search, their record, and its division into training and held-out frames.
+
+    Attributes
+    ----------
+    measurement, model
+        As for :func:`udd.discover`, held-out measurements last.
+    thin : list of Thinned
+    record : Record
+    train : ndarray (n,) of bool
+    order : list of int
+        The measurements' numbers in this order.
+    held_out : int
+        Count of whole held-out measurements.
+    """
+
+    measurement: Measurement | Sequence[Measurement]
+    model: Model | Sequence[Model]
+    thin: list[Thinned]
+    record: Record
+    train: NDArray[np.bool_]
+    order: list[int]
+    held_out: int
+
+    @property
+    def split(self) -> float:
+        """Time of the first frame that is not for training, s."""
+        later = ~(self.record.first(TRAIN) if self.held_out else self.train)
+        return float(self.record.clock[np.flatnonzero(later)[0]])
+
+    @property
+    def parts(self) -> tuple[Record, ...]:
+        """The training frames and the whole record; with held-out measurements only the first."""
+        training = self.record.part(self.train)
+        return (training,) if self.held_out else (training, self.record)
+
+
+def _prepared(measurement: Any, model: Any, state0: Any, held_out: Iterable[int] | None) -> _Data:
+    """Order, thin and divide the measurements."""
+    order, count = _held_out(measurement, held_out)
+    if count:
+        measurement, model, state0 = (_ordered(given, order) for given in (measurement, model, state0))
     thin = _thinned(continuous(measurement, model), model)
-    measurement = [thin_part.measurement for thin_part in thin]
+    measurement = [part.measurement for part in thin]
     if len(measurement) == 1:
         measurement, model, state0 = measurement[0], _only(model), _only(state0)
     record = record_of(measurement, model, state0)
-    first_model = _first(model)
-    given = _given(first_model, candidates)
-    n = len(record.t)
-    if n < _SHORTEST:
+    if (n := len(record.t)) < _SHORTEST:
         raise FitError(f"the record has {n} frames; to find and test an effect needs at least {_SHORTEST}")
-    train = (
-        ~np.isin(record.film, range(len(record_order) - held_out_count, len(record_order)))
-        if held_out_count
-        else record.first(TRAIN)
-    )
-    clock.finish("fitting the known model")
-    background_import.importing("scipy.stats", "pyoperon.sklearn")
+    trained = range(len(order) - count)
+    train = np.isin(record.film, trained) if count else record.first(TRAIN)
+    return _Data(measurement, model, thin, record, train, order, count)
 
+
+def _known_model(data: _Data, options: dict[str, Any]) -> tuple[Fit, Fit, dict[str, tuple[float, float]]]:
+    """Fit the known model to both parts; also return priors of parameters that these do not determine."""
     constrained: dict[str, tuple[float, float]] = {}
+    stated_priors = dict(options["priors"] or {})
 
     def fits() -> tuple[Fit, ...]:
-        parts = (record.part(train), *(() if held_out_count else (record,)))
         while True:
-            options["priors"] = {**constrained, **(priors or {})}
+            options["priors"] = {**constrained, **stated_priors}
             try:
                 return tuple(
                     parallel_map(
-                        lambda some: fit_record(measurement, some, model, **options, search=True), parts
+                        lambda some: fit_record(data.measurement, some, data.model, **options, search=True),
+                        data.parts,
                     )
                 )
             except SolveError as error:
-                more = _near_the_stated(model, error.undetermined, options["priors"])
+                more = _near_the_stated(data.model, error.undetermined, options["priors"])
                 if not more:
                     raise
                 constrained.update(more)
 
-    # With whole held-out records, the training data are all data that a fit may use.
-    base, *others_too = checked_units(measurement, model, options, fits)
-    baseline = others_too[0] if others_too else base
-    tests = Acceptance(record, ~train, clock, motion_time_scale(base), base.problem.free)
-    search = Search(tests, given)
-    before = search.tests.errors(base)
-    start_state = SearchState(base, baseline, before)
-    begin = _begin(search, start_state)
-    end = search.run(begin, start_state)
-    clock.finish("fitting the model as found")
+    fitted = checked_units(data.measurement, data.model, options, fits)
+    return fitted[0], fitted[-1], constrained
+
+
+def _answer(
+    data: _Data,
+    known: SearchState,
+    begin: SearchState,
+    search: Search,
+    end: Outcome,
+    constrained: Mapping[str, tuple[float, float]],
+) -> Discovery:
+    """Describe the end of a search, with its verdict."""
+    baseline, before = known.whole, known.errors
     final = refit(end.whole)
     reported = eased(final) if final.scatter > UNEXPLAINED else final
-    reported = replace(reported, unit_doubt=base.unit_doubt).without_cache().with_diagnostics()
+    reported = replace(reported, unit_doubt=known.part.unit_doubt).without_cache().with_diagnostics()
     added = [
-        replace(f, by_record=by_record(baseline, end.whole, f.effect, record_order)[0])
+        replace(f, by_record=by_record(baseline, end.whole, f.effect, data.order)[0])
         for step in end.accepted
         for f in _describe(step, reported)
     ]
     others = [a for step in end.accepted for a in step.alternatives]
-    doubtful = [a for a in others if a.likeness < SAME]
-    is_incomplete = bool(added) and lacks_more(final, end.errors)
-    excused = camera_shows(start_state.whole, end.whole) if added and not end.stopped else None
+    is_incomplete = lacks_more(final, end.errors)
+    excused = camera_shows(baseline, end.whole) if added and not end.stopped else None
     ratio = search.tests.improvement(before, end.errors) if added else (1.0, 1.0, 1.0)
     # Random forces predict nothing: only a law improves free runs that much.
     random = as_random(baseline, end.whole) if added and ratio[2] > FORETELLS else None
     unexplained = not added and (
         max(baseline.scatter, final.scatter) > UNEXPLAINED
-        or misses_the_motion(before, record, ~train)
-        or lacks_more(final, end.errors)
+        or misses_the_motion(before, data.record, ~data.train)
+        or is_incomplete
     )
     rejected: list[RejectedEffect] = end.unconfirmed
     stopped = end.stopped
     if unexplained and not rejected and end.rounds:
         try:
-            clock.tell("trying the closest candidates")
-            rejected = search.rejected(begin, end.rounds[-1], record_order)
+            search.clock.tell("trying the closest candidates")
+            rejected = search.rejected(begin, end.rounds[-1], data.order)
         except TimeUpError as up:
             stopped = stopped or str(up)
-    open_form = doubtful or is_incomplete or random or excused is not None or unexplained
-    doubts = doubts_of(added, reported, ratio, int(record.part(~train).observed.sum())) if added else []
-    verdict = verdict_of(added, bool(end.unconfirmed), doubts, bool(open_form), bool(stopped))
+    doubtful = any(a.likeness < SAME for a in others)
+    open_form = doubtful or is_incomplete or random is not None or excused is not None or unexplained
+    held_out = int(data.record.part(~data.train).observed.sum())
+    doubts = doubts_of(added, reported, ratio, held_out) if added else []
     return Discovery(
-        verdict=verdict,
+        verdict=verdict_of(added, bool(end.unconfirmed), doubts, open_form, bool(stopped)),
         baseline=baseline.without_cache().with_diagnostics() if added else reported,
         fit=reported,
         effects=added,
@@ -270,15 +325,15 @@ def discover(
         scans=[sorted(scores.library.scored, key=lambda s: -s.chi2) for scores in end.rounds],
         curves=[scores.curves for scores in end.rounds],
         comparisons=[scores.comparisons for scores in end.rounds],
-        split=float(record.clock[np.flatnonzero(~(record.first(TRAIN) if held_out_count else train))[0]]),
+        split=data.split,
         trained=end.part.without_cache(),
         rejected=rejected,
-        thinned=thin if any(thin_part.every > 1 for thin_part in thin) else [],
-        budget=clock.budget if stopped else None,
+        thinned=data.thin if any(part.every > 1 for part in data.thin) else [],
+        budget=search.clock.budget if stopped else None,
         stopped=stopped,
         excused=None if excused is None else [f.title for f in added if f.effect.name in excused],
         random=random.doubts.missed if random else [],
-        held_out=tuple(sorted(record_order[len(record_order) - held_out_count :])),
+        held_out=tuple(sorted(data.order[len(data.order) - data.held_out :])),
         undetermined=tuple(constrained),
         doubts=doubts,
     )

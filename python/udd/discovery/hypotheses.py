@@ -56,7 +56,7 @@ def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
 
 def spent(trial: TrialFit) -> float:
     """Return the cost of a spline's freedom in nats; its coefficients are fixed in a fit."""
-    return trial.price / 2 if trial.is_curve else 0.0
+    return trial.cost if trial.is_curve else 0.0
 
 
 @dataclass(frozen=True, eq=False)

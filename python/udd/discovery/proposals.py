@@ -165,7 +165,7 @@ class Proposals:
         best = list(first.values())[:_PAIRED]
         pairs = [list(pair) for pair in itertools.combinations(best, 2)]
         # The best single effect may hide the rest: pair it with each of the best-scored effects that brake.
-        leader = min(singles, key=lambda t: (-t.fit.level, t.fit.chi2 + t.price), default=None)
+        leader = min(singles, key=lambda t: (-t.fit.level, t.fit.chi2 / 2 + t.cost), default=None)
         usable = list(dict.fromkeys(first.get(s.candidate.effect.name) for s in self.scores.usable()))
         for other in filter(None, usable[:_PAIRED]):
             pair = [leader.candidates[0], other] if leader else []

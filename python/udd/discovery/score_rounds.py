@@ -15,7 +15,7 @@ from udd.discovery.scoring.shape_scan import strongest_shapes
 from udd.fitting import Fit, beyond_schedule, with_larger_model_error
 
 from .thresholds import ALPHA
-from .trial_fits import price_of
+from .trial_fits import cost_of_parameter
 
 _LEADS = 2.0  # ratio to the gain of the library's best; no two of its effects gain more together
 # the same if the model is off track: wrong effects of the library then take minutes to fit
@@ -50,9 +50,9 @@ class ScoreRound:
     def usable(self) -> list[Scored]:
         """Return candidates with physical amplitudes that no free parameter absorbs, the strongest first."""
         candidates = [s for s in self.library.scored if s.physical and not s.absorbed]
-        # Without the price of a scanned number a free power comes before the right law.
-        price = price_of(self.fit)
-        return sorted(candidates, key=lambda s: -round(s.chi2 - price * s.candidate.scanned, 3))
+        # Without the cost of a scanned number a free power comes before the right law.
+        cost = cost_of_parameter(self.fit)
+        return sorted(candidates, key=lambda s: -round(s.chi2 - 2 * cost * s.candidate.scanned, 3))
 
     def passing(self) -> list[Scored]:
         """Return usable candidates that neither chance nor a film's faults explain."""
@@ -66,8 +66,8 @@ class ScoreRound:
         ]
 
     def nats(self, scored: Scored) -> float:
-        """Return a candidate's gain in nats minus its parameters' price, as a curve's evidence."""
-        return (scored.chi2 - scored.candidate.parameters * price_of(self.fit)) / 2
+        """Return a candidate's gain in nats minus its parameters' cost, as a curve's evidence."""
+        return scored.chi2 / 2 - scored.candidate.parameters * cost_of_parameter(self.fit)
 
     def strongest(self) -> float:
         """Return the gain of the best explanation."""

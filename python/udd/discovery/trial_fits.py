@@ -33,9 +33,9 @@ def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
     return bool(a @ np.linalg.solve(block, a) >= chi_squared.isf(ALPHA, len(indices)))
 
 
-def price_of(fitted: Fit) -> float:
-    """Return the price of a parameter, in chi2 (BIC)."""
-    return math.log(fitted.observations)
+def cost_of_parameter(fitted: Fit) -> float:
+    """Return the cost of a parameter by the Bayesian information criterion, nats."""
+    return math.log(fitted.observations) / 2
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class TrialFit:
     fit : Fit
     names : list of str
         Parameters that the proposal adds.
-    price : float
-        Price of its freedom, in chi2 (BIC).
+    cost : float
+        Cost of its freedom, nats.
     freedom : float
         Count of estimated numbers.
     curve : Curve or None
@@ -62,7 +62,7 @@ class TrialFit:
     candidates: list[Candidate]
     fit: Fit
     names: list[str]
-    price: float
+    cost: float
     freedom: float
     curve: Curve | None = None
     formula: Formula | None = None
@@ -116,8 +116,8 @@ def of_library(
     except FitError:
         return None
     names = [name for c in candidates for name in c.amplitude_names]
-    price = price_of(fitted) * sum(c.parameters for c in candidates)
-    trial = TrialFit(candidates, fitted, names, price, len(names))
+    cost = cost_of_parameter(fitted) * sum(c.parameters for c in candidates)
+    trial = TrialFit(candidates, fitted, names, cost, len(names))
     return trial if trial.physical and fitted.converged else None
 
 
@@ -146,12 +146,12 @@ def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
     if not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)
-    price = 2 * located.price + _excess(current, located.curve)
-    return TrialFit([candidate], located.fit, [], price, located.curve.df, located.curve)
+    cost = located.cost + _excess(current, located.curve)
+    return TrialFit([candidate], located.fit, [], cost, located.curve.df, located.curve)
 
 
 def _excess(current: Fit, curve: Curve) -> float:
-    """Return a curve's penalty, in chi2, for values beyond the largest observed rates.
+    """Return the cost, in nats, of a curve's values beyond the largest observed rates.
 
     Its prior has their width. A curve wider by a factor pays the factor's logarithm for each estimated
     number.
@@ -167,7 +167,7 @@ def _excess(current: Fit, curve: Curve) -> float:
         shown = (forces * rates[:, [model.state_names.index(name) for name in speeds]]).sum(axis=1)
     most = float(np.abs(curve.values(*curve.places)).max())
     ratio = most / max(float(np.abs(shown).max()), 1e-300)
-    return 2 * curve.df * math.log(max(ratio, 1.0))
+    return curve.df * math.log(max(ratio, 1.0))
 
 
 def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None = None) -> TrialFit | None:
@@ -179,8 +179,8 @@ def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None =
         return None
     effect = fitted.model.effects[-1]
     names = [f"{name}.{p}" for p in effect.parameters]
-    price, free = price_of(fitted) * len(names), len(names)
-    trial = TrialFit([Candidate(effect, effect.title)], fitted, names, price, free, curve, written)
+    cost = cost_of_parameter(fitted) * len(names)
+    trial = TrialFit([Candidate(effect, effect.title)], fitted, names, cost, len(names), curve, written)
     return trial if trial.physical and fitted.converged else None
 
 

@@ -120,7 +120,7 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
     """Fit the curve under the prior with the highest evidence.
 
     Second differences are normal with a common variance, which the evidence chooses. A constant and a slope
-    each have the price of a parameter in the Bayesian information criterion.
+    each cost a parameter in the Bayesian information criterion.
 
     Parameters
     ----------

@@ -239,7 +239,7 @@ def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
     return (kind, a, b)
 
 
-def price(node: Node) -> float:
+def description_length(node: Node) -> float:
     """Compute the formula's description length in nats, without its constants' values.
 
     Each of its k operations, functions and variables is one of the n different ones in it: k ln n.

@@ -18,9 +18,9 @@ from .expressions import (
     Node,
     amplitudes,
     constants,
+    description_length,
     evaluate,
     exponents,
-    price,
     put,
     sensible,
     shape,
@@ -58,7 +58,7 @@ class Formula:
     amplitudes : tuple of str
         Those to which it is jointly proportional.
     nats : float
-        Log evidence relative to the smooth curve, with the price of its length and constants.
+        Log evidence relative to the smooth curve, minus the cost of its length and constants.
     node : tuple
         See :mod:`udd.discovery.symbolic.expressions`.
     variable : str
@@ -101,8 +101,8 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
 
     Usual forms (powers, steps, bumps, waves) and those from symbolic regression (pyoperon, if installed) are
     fitted to the curve's coefficients with their full information, which accounts for confounding with the
-    free parameters. Each constant costs its price in the Bayesian
-    information criterion, and each operation its description length. Needless constants are removed.
+    free parameters. Each constant has its cost in the Bayesian
+    information criterion, each operation its description length. Needless constants are removed.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ class _Target:
         self.between = asked(_BETWEEN)
         self.target: Array = vectors[:, keep].T @ curve.score.gradient / root
         self.angle = curve.coordinates[0].angle
-        self.price = math.log(observations) / 2
+        self.cost = math.log(observations) / 2
 
     def takes(self, node: Node) -> bool:
         """Return True if the formula can be a law, which vanishes with its amplitudes."""
@@ -281,7 +281,7 @@ class _Target:
         lost = float(between @ between - solved.fun @ solved.fun) / 2
         if lost >= max(gain / 2, EVIDENCE_MARGIN):
             return None
-        return _Fitted(gain - self.price * len(numbers) - price(node), node, result)
+        return _Fitted(gain - self.cost * len(numbers) - description_length(node), node, result)
 
     def shorten(self, fitted: _Fitted) -> _Fitted:
         """Remove constants one by one while that pays."""
@@ -294,7 +294,7 @@ class _Target:
                     node = simplify(put(fitted.node, number, value), values)
                     trial = self.fit(node, values) if self.takes(node) else None
                     # A factor has a unit: it may become 1 only if another one replaces it.
-                    least = self.price - 0.1 if value == 1.0 and number not in exponents(fitted.node) else 0.0
+                    least = self.cost - 0.1 if value == 1.0 and number not in exponents(fitted.node) else 0.0
                     if trial is not None and trial.nats > fitted.nats + least:
                         fitted, improved = trial, True
                         break

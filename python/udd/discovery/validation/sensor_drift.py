@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
-from udd.discovery.trial_fits import price_of
+from udd.discovery.trial_fits import cost_of_parameter
 from udd.fitting import Fit, eased
 from udd.fitting.time_scale import correlation_time, takes_to_change
 
@@ -21,7 +21,7 @@ _FEWEST = 3
 def drift_gain(fit: Fit) -> float:
     """Compute the decrease in chi2, in units of the fit's scatter, by a slow drift of each channel's zero.
 
-    It is a lower bound, because the motion is fixed. It is zero if it is below the price of the drift's
+    It is a lower bound, because the motion is fixed. It is zero if it is below the cost of the drift's
     freedom, or if the record is too short to distinguish a drift from its motion.
     """
     sd = fit.noise.sd(fit.record, fit.blurring) / np.sqrt(np.maximum(fit.noise.weight, 1e-12))[:, None]
@@ -43,7 +43,7 @@ def drift_gain(fit: Fit) -> float:
             scaled = misfit[seen] / size[seen]
             remainder = scaled - weighted @ np.linalg.lstsq(weighted, scaled, rcond=None)[0]
             fall = float(scaled @ scaled - remainder @ remainder) / max(fit.scatter, 1.0)
-            total += fall if fall > price_of(fit) * weighted.shape[1] else 0.0
+            total += fall if fall > 2 * cost_of_parameter(fit) * weighted.shape[1] else 0.0
     return total
 
 
