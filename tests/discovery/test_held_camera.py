@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import udd
-from udd.discovery.hypotheses import log_evidence
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.validation.held_camera import camera_shows
 from udd.fitting import extend, fit_record, most_probable, record_of, refit
@@ -63,9 +62,7 @@ def test_forms_are_compared_by_the_noise_that_shows() -> None:
     baseline = fit_record(record, record_of(record), udd.Pendulum(0.6, k0=0.008), search=True)
     alone = extend(baseline, [udd.effects.cubic_drag()], [0.0])
     both = extend(alone, [udd.effects.quadratic_drag()], [0.0])
-    assumed, shown = (
-        log_evidence(again(both), ()) - log_evidence(again(alone), ()) for again in (refit, most_probable)
-    )
+    assumed, shown = (again(both).evidence - again(alone).evidence for again in (refit, most_probable))
     assert assumed < EVIDENCE_MARGIN < shown
 
 

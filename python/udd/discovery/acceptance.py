@@ -37,7 +37,7 @@ from udd.fitting import (
 )
 from udd.fitting.parameters import Free
 
-from .hypotheses import Hypothesis, log_evidence, log_prior, named, ranked, rivals, spent
+from .hypotheses import Hypothesis, log_evidence, log_prior, named, ranked, rivals
 from .results import Alternative
 from .score_rounds import ScoreRound
 from .thresholds import ALPHA, Confirmation
@@ -244,7 +244,7 @@ class Acceptance:
 
         def first(trial: TrialFit) -> float:
             try:
-                return log_evidence(eased(trial.fit), trial.names) - spent(trial)
+                return Hypothesis(trial, trial, eased(trial.fit), log_prior(trial, terms)).log_z
             except FitError:
                 return -math.inf
 

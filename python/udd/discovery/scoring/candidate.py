@@ -50,9 +50,19 @@ class Candidate:
         return sum(p.role == "scanned" for p in self.effect.spec.parameters)
 
     @property
+    def shapes(self) -> int:
+        """Count of parameters that give the effect its shape: a place, a width, an exponent."""
+        return sum(p.role in ("scanned", "shape") for p in self.effect.spec.parameters)
+
+    @property
     def amplitude_names(self) -> list[str]:
         """Names of the amplitudes among a model's parameters."""
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]
+
+
+def depends_on_angle(effect: effects.Effect) -> bool:
+    """Return True if an effect depends on the angle itself, as faults of a film's geometry do."""
+    return bool(re.search(r"\b(theta|beta)\b", effect.equation))
 
 
 def brakes_with_time(effect: effects.Effect) -> bool:
