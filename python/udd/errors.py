@@ -110,7 +110,7 @@ def interrupted(build: Callable[[], Any], message: str, partial: bool) -> None:
 
 
 def outside() -> int:
-    """The `stacklevel` at which a warning of the caller names the line that called the package."""
+    """Return the `stacklevel` at which a warning of the caller names the line that called the package."""
     package, level = __name__.partition(".")[0], 1
     frame = inspect.currentframe()
     frame = frame.f_back if frame is not None else None

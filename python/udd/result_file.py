@@ -201,7 +201,7 @@ class _Writer:
         self._places: dict[int, tuple[object, dict[str, int]]] = {}  # the object too: its id stays its own
 
     def value(self, value: Any) -> Any:
-        """A value as JSON."""
+        """Return a value as a JSON value."""
         if isinstance(value, np.generic):
             value = value.item()
         if value is None or isinstance(value, bool | int | str):
@@ -258,7 +258,7 @@ _hints = functools.cache(get_type_hints)
 
 
 def checked(name: str, given: dict[str, Any]) -> Any:
-    """An object of one of the types of a file, its fields' types and shapes checked.
+    """Make an object of one of the types of a file, with its fields' types and shapes checked.
 
     Raises
     ------
@@ -276,7 +276,7 @@ def checked(name: str, given: dict[str, Any]) -> Any:
 
 
 def driven(equations: Any, records: list[dict[str, InputSignal]], record: int) -> Model:
-    """A model with what was measured of its inputs.
+    """Return a model with the measured inputs.
 
     Raises
     ------
@@ -290,13 +290,13 @@ def driven(equations: Any, records: list[dict[str, InputSignal]], record: int) -
 
 
 def _sound(fit: Fit) -> bool:
-    """Whether a fit's numbers are those of the parameters that were free, and its scatter is one."""
+    """Return True if a fit's numbers belong to its free parameters, and its scatter is a number."""
     free = [one.name for one in fit.problem.free]
     return list(fit.parameters) == free == list(fit.errors) and fit.dof != 0
 
 
 def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
-    """The last object of a file."""
+    """Read the last object of a file."""
     model = model_from_dict(tree["model"], fitted=True)
     curves = {(slot.name, slot.momentum): slot for slot in slots(model)}
     objects: list[Any] = []

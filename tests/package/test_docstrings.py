@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import importlib
 import inspect
@@ -16,7 +17,9 @@ from numpydoc.validate import validate
 
 import udd
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PACKAGE = ROOT / "python" / "udd"
 MODULES = ("udd", *(f"udd.{name}" for name in udd.__all__ if inspect.ismodule(getattr(udd, name))))
 FUNCTIONS = [name for name in udd.__all__ if inspect.isfunction(getattr(udd, name))]
 CLASSES = [name for name in udd.__all__ if inspect.isclass(getattr(udd, name))]
@@ -29,7 +32,8 @@ OF_ALL = {"GL07", "GL08", "PR02", "PR03", "PR10"}
 OF_A_FUNCTION = OF_ALL | {"PR01", "RT01", "EX01"}
 
 #: A first line begins with none of these words, as a phrase about an action or a thing does not.
-CLAUSE = {"what", "whatever", "whether", "how", "where", "when", "which", "who", "why", "if", "as", "of"}
+CLAUSE = {"what", "whatever", "whether", "how", "where", "when", "which", "who", "why", "if", "as"}
+CLAUSE |= {"of", "for", "from", "by", "in"}
 ARTICLE = {"the", "a", "an", "all", "each", "every", "those", "it", "its"}
 
 
@@ -135,6 +139,44 @@ def test_first_lines_are_imperative_or_noun_phrases() -> None:
         if (fault := first_line_fault(" ".join(doc["Summary"]), inspect.isfunction(value)))
     }
     assert bad == {}
+
+
+def is_property(node: ast.AST) -> bool:
+    """Return True if a definition is read like an attribute."""
+    decorators = getattr(node, "decorator_list", [])
+    return any("property" in ast.unparse(decorator) for decorator in decorators)
+
+
+def first_line_faults(source: str) -> list[str]:
+    """Return the first lines of docstrings that are no phrases, with the lines of their definitions."""
+    result = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        summary = (ast.get_docstring(node) or "").partition("\n")[0]
+        is_action = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not is_property(node)
+        word = re.sub(r"\W.*", "", summary).lower()
+        if word in CLAUSE or (is_action and word in ARTICLE):
+            result.append(f"{getattr(node, 'lineno', 1)}: {summary}")
+    return result
+
+
+def test_first_lines_of_a_source_are_judged() -> None:
+    assert first_line_faults('def f():\n    """The number of points."""\n') == ["1: The number of points."]
+    assert first_line_faults('class A:\n    """How it moves."""\n') == ["1: How it moves."]
+    assert first_line_faults('"""Whether it moves."""\n') == ["1: Whether it moves."]
+    assert first_line_faults('@property\ndef f():\n    """The number of points."""\n') == []
+    assert first_line_faults('def f():\n    """Count the points."""\n') == []
+
+
+def test_first_lines_of_all_docstrings_are_phrases() -> None:
+    faults = [
+        f"{path.relative_to(PACKAGE)}:{fault}"
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if not f"udd.{path.relative_to(PACKAGE).parts[0]}".startswith(PENDING)
+        for fault in first_line_faults(path.read_text(encoding="utf-8"))
+    ]
+    assert faults == []
 
 
 def parameters(function: Callable[..., Any]) -> list[str]:

@@ -7,6 +7,6 @@ from numpy.typing import NDArray
 
 
 def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same angle within half a turn of zero."""
+    """Return the equal angle within half a turn of zero."""
     result: NDArray[np.float64] = (angle + np.pi) % (2 * np.pi) - np.pi
     return result

@@ -13,7 +13,7 @@ from udd.errors import UddError
 
 
 def made_folder(path: str | os.PathLike[str]) -> Path:
-    """A folder to write to, made with those above it if it is not there.
+    """Return a folder to write to; it and those above it are made if needed.
 
     Raises
     ------

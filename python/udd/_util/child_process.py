@@ -63,7 +63,7 @@ class ChildProcess:
             rest = rest[self.to.write(rest) :]
 
     def line(self, longest: int = 1 << 24) -> bytes:
-        """The next line that it writes; empty where it says nothing more."""
+        """Read the next line that the process writes; empty at the end."""
         return self.pipe.readline(longest) if self._ready() else b""
 
     def fill(self, room: Any) -> bool:
@@ -82,7 +82,7 @@ class ChildProcess:
         return True
 
     def _ready(self) -> bool:
-        """Whether it says something before patience ends (systems that cannot tell wait for ever)."""
+        """Return True if the process answers before patience ends (always on systems that cannot wait)."""
         try:
             return bool(select.select([self.pipe], [], [], self.patience)[0])
         except (OSError, ValueError):  # Windows selects among sockets only

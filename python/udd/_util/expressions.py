@@ -17,7 +17,7 @@ Expression: TypeAlias = "str | float | sympy.Expr"
 
 
 def text_of(what: str, expression: object) -> str:
-    """The formula as text that the core reads.
+    """Return the formula as text that the core reads.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def text_of(what: str, expression: object) -> str:
 
 
 def _from_sympy(what: str, expression: Any) -> str:
-    """As SymPy prints it, but for numbers in full and names as the core has them."""
+    """Return SymPy's text, with numbers in full and names as the core has them."""
     from sympy import Derivative, Expr, Ge, Gt, Le, Lt, true
     from sympy.core.function import AppliedUndef
     from sympy.printing.str import StrPrinter

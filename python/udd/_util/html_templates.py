@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def templates(package: str) -> Environment:
-    """Those in a package's folder `templates`; a name that a page does not know is an error."""
+    """Return the templates in a package's folder `templates`; an unknown name in a page is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     return Environment(

@@ -70,14 +70,14 @@ class MemoryLimit:
             raise self.exceeded()
 
     def exceeded(self) -> UddError:
-        """The error of data that are too large."""
+        """Return the error of data that are too large."""
         more = re.sub(r"e\+0*", "e", f" (limit={10.0 * min(self.limit, 1e300):.0e} allows more)")
         said = f"the data take more than the limit of {in_bytes(self.limit)}"
         return self.error(said + more * self.is_argument)
 
 
 def in_bytes(size: float) -> str:
-    """A number of bytes in words, such as ``1.5 GB``."""
+    """Return a number of bytes in words, such as ``1.5 GB``."""
     for unit, name in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
         if size >= unit:
             return f"{size / unit:.3g} {name}"

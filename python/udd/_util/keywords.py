@@ -53,7 +53,7 @@ def renamed_attribute(old: str, new: str) -> property:
 
 
 def with_defaults(function: str, defaults: Options, given: Mapping[str, Any]) -> Options:
-    """The keyword arguments that a function shares with others, those not given by their defaults.
+    """Return the keyword arguments that a function shares with others; defaults fill the rest.
 
     Raises
     ------

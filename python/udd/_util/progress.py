@@ -1,4 +1,4 @@
-"""How long work is shown while it runs: a bar, lines of text, or a function of the caller's."""
+"""Display of progress: a bar, lines of text, or a function of the caller's."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def is_watched() -> bool:
 
 
 def _bar_class() -> Any:
-    """A notebook's own bar, or a terminal's."""
+    """Return the class of a notebook's bar, or of a terminal's."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a notebook without widgets has bars of text
         from tqdm.auto import tqdm

@@ -10,7 +10,7 @@ import numpy as np
 
 
 def is_a(value: object, hint: Any) -> bool:
-    """Whether a value has the type that an annotation of a field says, elements included."""
+    """Return True if a value has the type of a field's annotation, elements included."""
     kind, inner = get_origin(hint), get_args(hint)
     if hint is Any:
         return True
@@ -39,7 +39,7 @@ def _holds(dtype: np.dtype[Any], scalar: Any) -> bool:
 
 
 def consistent(value: object, shapes: str) -> bool:
-    """Whether arrays and lists have shapes that go together.
+    """Return True if arrays and lists have shapes that fit together.
 
     Parameters
     ----------

@@ -12,5 +12,5 @@ _SMALL = {
 
 
 def small_unit(unit: str) -> tuple[str, float]:
-    """The unit for small values, and by what values in `unit` are multiplied; others stay as they are."""
+    """Return the unit for small values, and the factor from `unit` to it."""
     return _SMALL.get(unit, (unit, 1.0))

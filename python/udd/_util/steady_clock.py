@@ -56,7 +56,7 @@ class SteadyClock:
         return float(self.all_at(np.array([t]), parts)[0])
 
     def all_at(self, t: Array, parts: int = 1) -> Array:
-        """As :meth:`at`, of times (n,)."""
+        """Apply :meth:`at` to times (n,)."""
         number = np.round((t - self.start) / self.period * parts) / parts
         exact: Array = self.start + number * self.period
         return np.where(np.abs(exact - t) <= self.rounding, exact, t)
@@ -117,7 +117,7 @@ def steady_clock(t: Array, rounding: float | None = None) -> SteadyClock | None:
 
 
 def _decimal(t: Array) -> float:
-    """The power of ten of which all times are multiples, s; 0 if there is none from 1 s to 1 us."""
+    """Return the power of ten of which all times are multiples, s; 0 if none from 1 s to 1 us is."""
     for k in _DECIMALS:
         scaled = t * 10.0**k
         if np.abs(scaled - np.round(scaled)).max() < 1e-9 * max(1.0, float(np.abs(scaled).max())):
@@ -126,7 +126,7 @@ def _decimal(t: Array) -> float:
 
 
 def _line(number: Array, t: Array) -> tuple[float, float]:
-    """The slope of least squares, and its standard deviation by the scatter about it."""
+    """Return the slope of least squares, and its standard deviation by the scatter about it."""
     away = number - number.mean()
     power = float(away @ away)
     slope = float(away @ t) / power

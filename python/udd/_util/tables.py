@@ -30,7 +30,7 @@ def table(
     *,
     error: type[UddError] = ModelError,
 ) -> dict[str, Any]:
-    """A copy of a table that has each of the keys `needed`, and none but those `allowed`.
+    """Copy a table that must have each of the keys `needed`, and none but those `allowed`.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def table(
 
 
 def arguments(where: str, data: object, of: Callable[..., Any]) -> dict[str, Any]:
-    """A table of the arguments of a function."""
+    """Return a table of the arguments of a function."""
     taken = inspect.signature(of).parameters
     return table(where, data, taken, [name for name, one in taken.items() if one.default is one.empty])
 
@@ -108,7 +108,7 @@ def read(
 
 
 def _deeper(data: object, limit: int) -> bool:
-    """Whether lists and tables stand within each other more than `limit` deep."""
+    """Return True if lists and tables are nested more than `limit` deep."""
     if isinstance(data, Mapping | list | tuple):
         return not limit or any(
             _deeper(one, limit - 1) for one in (data.values() if isinstance(data, Mapping) else data)

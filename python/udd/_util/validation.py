@@ -15,7 +15,7 @@ _LARGEST = 2**62  # as a number of the core, with room for sums
 
 
 def number(name: str, value: object, *, least: float | None = None, above: float | None = None) -> float:
-    """A finite float, at least `least` or above `above`.
+    """Check a finite float, at least `least` or above `above`.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def number(name: str, value: object, *, least: float | None = None, above: float
 
 
 def whole(name: str, value: object, least: int) -> int:
-    """A whole number of at least `least`.
+    """Check a whole number of at least `least`.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def whole(name: str, value: object, least: int) -> int:
 
 
 def array(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """A C-contiguous, aligned float64 array of finite numbers; what is not is copied.
+    """Return a C-contiguous, aligned float64 array of finite numbers; copy what is not.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""Which versions made a result."""
+"""Versions that made a result."""
 
 from __future__ import annotations
 
 
 def version_of(name: str) -> str:
-    """A package's version."""
+    """Return a package's version."""
     from importlib.metadata import PackageNotFoundError, version  # takes longer than all else of a help
 
     try:
@@ -14,7 +14,7 @@ def version_of(name: str) -> str:
 
 
 def versions(*names: str) -> str:
-    """The versions of packages, of Python and of the machine, on which numbers may depend."""
+    """Return the versions of packages, of Python and of the machine, on which numbers may depend."""
     import platform  # takes milliseconds, of a program's start too
 
     packages = ", ".join(f"{name} {version_of(name)}" for name in names)

@@ -62,7 +62,7 @@ def _listen(source: BinaryIO, work: Interruptible, questions: queue.SimpleQueue[
 def _answer(
     work: Interruptible, stopped: threading.Event, seconds: float, function: Any, arguments: tuple[Any, ...]
 ) -> Any:
-    """The function's result, or the error that it raised."""
+    """Return the function's result, or the error that it raised."""
 
     def called() -> Any:
         if stopped.is_set():

@@ -1,4 +1,4 @@
-"""How many pages one address may have open."""
+"""Limit on the number of pages of an address."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class Connection(H11Protocol):
 
     @property
     def waiting(self) -> bool:
-        """Whether the server waits for the visitor, and no WebSocket is open."""
+        """Return True if the server waits for the visitor, and no WebSocket is open."""
         upgraded = self.transport.get_protocol() is not self
         return not upgraded and (self._unread or self.cycle is None or self.cycle.response_complete)
 
@@ -125,7 +125,7 @@ def _close_oldest(connections: Any, new: Connection) -> bool:
 
 
 def max_connections() -> int:
-    """How many connections there may be: each is a file, of which the system gives only so many."""
+    """Return the greatest number of connections: each is a file, of which the system has a limited number."""
     return min(limits.CONNECTIONS, max(8, (_files() - limits.BACKLOG) // 2))
 
 
@@ -199,7 +199,7 @@ class _Server(uvicorn.Server):
 
 
 def server_of(app: ASGIApp) -> uvicorn.Server:
-    """The server of an application, with limits for what comes from the network."""
+    """Return the server of an application, with limits for data from the network."""
     config = uvicorn.Config(
         app,
         http=Connection,

@@ -20,7 +20,7 @@ _LOCK = "lock"
 
 @contextlib.contextmanager
 def workspace() -> Iterator[Path]:
-    """A new folder that only this user can read, deleted at the end; delete those of dead servers."""
+    """Make a folder that only this user can read, deleted at the end; delete those of dead servers."""
     remove_abandoned(Path(tempfile.gettempdir()))
     folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
     lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o600)

@@ -162,7 +162,7 @@ class Runs:
         self._kept: OrderedDict[str, Run] = OrderedDict()
 
     def of(self, start: Start) -> Run:
-        """The run from there."""
+        """Return the run from this start."""
         key = key_of(start)
         if key not in self._kept:
             self._kept[key] = Run(start)
@@ -219,7 +219,7 @@ def _with_unit(name: str, unit: str) -> str:
 
 
 def _parameters(model: Model) -> list[str]:
-    """Each parameter with its unit on the page, then the effects."""
+    """List each parameter with its unit on the page, then the effects."""
     ranges = page_model(model).ranges
     lines = [
         f"{_with_unit(name, unit)} = {model.parameters[name] * scale:.10g}"

@@ -71,7 +71,7 @@ class Exponents:
 
 
 def starts_of(start: Start) -> Array:
-    """Where the orbits of a diagram begin: the page's state, its mirror image, and a third one."""
+    """Return the initial states of a diagram: the page's state, its mirror image, and a third one."""
     state = np.array(start.state)
     mirrored = state.copy()
     mirrored[:2] *= -1.0

@@ -13,7 +13,7 @@ PLAIN = Disk(0.0)
 
 @dataclass(frozen=True)
 class PageModel:
-    """How the page shows a model.
+    """Properties of a model on the page.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ PAGE_MODELS = {
 
 
 def page_model(model: Model) -> PageModel:
-    """How the page shows a model.
+    """Return the properties of a model on the page.
 
     Raises
     ------

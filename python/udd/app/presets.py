@@ -69,7 +69,7 @@ def _presets() -> list[tuple[str, Model, list[float]]]:
 
 @functools.cache
 def catalogue() -> dict[str, Any]:
-    """All of it, as JSON knows it."""
+    """Return all presets as JSON values."""
     return {
         "rate": RATE,
         "limits": {

@@ -58,7 +58,7 @@ def _values(effect: Any) -> list[str]:
 
 
 def _explore(discovery: Any) -> dict[str, Any] | None:
-    """The fitted model and its first state, to run on the page; None for what the page does not show."""
+    """Return the fitted model and its first state, to run on the page; None if the page cannot show it."""
     model = discovery.fit.models[0]
     if not isinstance(model, Disk) or any(e.made is not None for e in model.effects):
         return None

@@ -52,7 +52,7 @@ class Guard:
             await PlainTextResponse(said, 403)(scope, receive, _with_headers(send))
 
     def refusal(self, scope: Scope) -> str | None:
-        """Why a request is refused, in a sentence."""
+        """Return the reason for refusing a request, in a sentence; None if it is accepted."""
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_own_host(hosts[0]):

@@ -1,4 +1,4 @@
-"""From the command to a page that is served."""
+"""Start of the server by the command."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class Start:
 
 
 def start_of(data: Any) -> Start:
-    """A model and a state, as the page writes them down.
+    """Read a model and a state from the page's JSON.
 
     Raises
     ------
@@ -38,26 +38,26 @@ def start_of(data: Any) -> Start:
 
 
 def model_of(data: Any) -> Model:
-    """A disk or the DLE from JSON, with effects of the library."""
+    """Make a disk or the DLE from JSON, with effects of the library."""
     if isinstance(data, dict) and data.get("kind") not in tuple(PAGE_MODELS):  # also what is not hashable
         raise ModelError(f"the page shows a disk or the dle, not {data.get('kind')!r}")
     return model_from_dict(data)
 
 
 def key_of(start: Start) -> str:
-    """The same text for the same run."""
+    """Return a text that is equal for equal runs."""
     return f"{start.model!r} {start.state!r}"
 
 
 def drive_of(model: Model) -> str:
-    """The name of the drive among the parameters."""
+    """Return the name of the drive among the parameters."""
     drive = model.profile.dynamics.drive
     assert drive is not None  # of the models that the page shows
     return drive
 
 
 def message_of(text: str) -> dict[str, Any]:
-    """A message from the page.
+    """Read a message from the page.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def message_of(text: str) -> dict[str, Any]:
 
 
 def whole(data: dict[str, Any], name: str, least: int, most: int) -> int:
-    """A whole number of a message."""
+    """Read a whole number of a message."""
     value = data.get(name)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise ModelError(f"{name} must be a whole number from {least} to {most}, not {value!r}")

@@ -77,7 +77,7 @@ def _kind(path: Path) -> str:
 
 
 def _cells(table: Table, k: int) -> list[str]:
-    """The first cells of a column, as numbers or else as text."""
+    """Return the first cells of a column, as numbers if possible, otherwise as text."""
     try:
         return [f"{value:.6g}" for value in table.numbers(k)[:_ROWS].tolist()]
     except UddError:
@@ -151,7 +151,7 @@ def measurement_of(path: Path, choices: Sequence[Any], constants: dict[str, Any]
 
 
 def _factor(role: str, unit: str, stated: str) -> float:
-    """By what values are multiplied that were read by the unit that the heading states."""
+    """Return the factor for values that were read with the unit of the heading."""
     factors = UNITS[_base(role)]
     if not unit or unit == stated:
         return 1.0

@@ -19,7 +19,7 @@ class TooLarge(UddError):
 
 
 def private_folder(parent: Path) -> Path:
-    """A new folder that only this user can read."""
+    """Make a folder that only this user can read."""
     return Path(tempfile.mkdtemp(dir=parent))
 
 
@@ -78,7 +78,7 @@ async def receive(chunks: AsyncIterator[bytes], folder: Path) -> Path:
 
 
 def _named(file: Path) -> Path:
-    """The file under a name with the ending that its content calls for."""
+    """Rename the file by the ending that fits its content."""
     with file.open("rb") as opened:
         start = opened.read(4096)
     table = ".parquet" if start.startswith(b"PAR1") else ".csv"

@@ -38,11 +38,11 @@ def diagram(generation: int, found: Diagram) -> bytes:
 
 
 def exponents(generation: int, found: Exponents) -> bytes:
-    """How many; then the drives, the exponents, their errors."""
+    """Encode exponents: their number, the drives, the exponents, their errors."""
     return _pack(EXPONENTS, generation, found.values.shape, *vars(found).values())
 
 
 def frame(said: dict[str, Any], picture: bytes) -> bytes:
-    """A picture of a film: the length of the JSON text that follows, then the JPEG."""
+    """Encode a picture of a film: the length of the JSON text that follows, then the JPEG."""
     text = json.dumps(said, allow_nan=False).encode()
     return struct.pack("<8I", FRAME, 0, len(text), 0, 0, 0, 0, 0) + text + picture

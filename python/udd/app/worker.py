@@ -77,7 +77,7 @@ def _sentence(error: object, file: str) -> str:
 
 
 def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
-    """From a film or a table to the verdict."""
+    """Find the verdict for a film or a table."""
     from udd.discovery import discover
     from udd.models import Disk, Model, Pendulum
 
@@ -118,7 +118,7 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
 
 def _tracked(file: Path, radius: float, tell: Tell, drive: bool = True) -> Any:
-    """The motion in a film, shown while it is tracked."""
+    """Track a film, and show it meanwhile."""
     import cv2
 
     from udd.tracking import Film, TrackedFrame, TrackError, track_disk
@@ -160,7 +160,7 @@ def _tracked(file: Path, radius: float, tell: Tell, drive: bool = True) -> Any:
 
 
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
-    """A film of a run of the page."""
+    """Film a run of the page."""
     from udd.film import render
     from udd.simulation.trajectory import integrated
 

@@ -27,7 +27,7 @@ def section_runner(
     t_max: float | None,
     each: int,
 ) -> SectionRunner:
-    """The checked way to run the model from section to section.
+    """Return the checked runner from section to section.
 
     `rows` are the parameters of the jobs, `each` is the number of points of one.
     """
@@ -42,7 +42,7 @@ def section_runner(
 
 
 def start_states(model: Model, starts: ArrayLike | None) -> Floats:
-    """The initial states (n, dim)."""
+    """Return the initial states (n, dim)."""
     require_model(model)
     if starts is None:
         return np.array([default_state(model)])
@@ -53,7 +53,7 @@ def start_states(model: Model, starts: ArrayLike | None) -> Floats:
 
 
 def parameter_values(model: Model, parameter: str, values: ArrayLike) -> Floats:
-    """The values of the parameter along a diagram."""
+    """Return the values of the parameter along a diagram."""
     require_model(model)
     if parameter not in model.parameters:
         raise ModelError(
@@ -66,7 +66,7 @@ def parameter_values(model: Model, parameter: str, values: ArrayLike) -> Floats:
 
 
 def increasing(name: str, values: ArrayLike) -> Floats:
-    """A list of increasing numbers."""
+    """Check a list of increasing numbers."""
     axis = array(f"the values of {name}", values)
     if axis.ndim != 1 or not len(axis):
         raise ModelError(f"the values of {name} must be a list of at least one number")
@@ -76,7 +76,7 @@ def increasing(name: str, values: ArrayLike) -> Floats:
 
 
 def parameter_rows(model: Model, changes: dict[str, Floats], jobs: int) -> NDArray[np.float64]:
-    """The parameters of each job, shape (jobs, parameters)."""
+    """Return the parameters of each job, shape (jobs, parameters)."""
     rows = np.tile(np.array(list(model.parameters.values())), (jobs, 1))
     for name, values in changes.items():
         rows[:, list(model.parameters).index(name)] = values

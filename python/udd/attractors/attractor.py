@@ -51,7 +51,7 @@ class Attractor:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """For the nearest points."""
+        """Return a tree of the points, for the nearest ones."""
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
@@ -89,13 +89,13 @@ def alike(first: Attractor, other: Attractor, tight: Tightness) -> bool:
 
 
 def distance_between(one: Attractor, other: Attractor) -> float:
-    """How far two sets of points are from each other: the mean distance to the other's nearest point."""
+    """Compute the distance of two sets of points: the mean distance to the nearest point of the other set."""
     there, _ = one.tree.query(other.points)
     back, _ = other.tree.query(one.points)
     return max(float(there.mean()), float(back.mean()))
 
 
 def mirrored(attractor: Attractor, sign: Floats, coordinates: Coordinates) -> Attractor:
-    """The mirror image."""
+    """Return the mirror image."""
     states = sign * attractor.states
     return Attractor(attractor.kind, states, coordinates(states), attractor.duration)

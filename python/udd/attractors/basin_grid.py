@@ -194,7 +194,7 @@ def basins(
 def _starts(
     model: Model, grid: Mapping[str, ArrayLike], state0: ArrayLike | None
 ) -> tuple[dict[str, Floats], Floats]:
-    """The axes of the grid, and its states (jobs, dim), the last axis first to vary."""
+    """Return the axes of the grid, and its states (jobs, dim), the last axis first to vary."""
     if not isinstance(grid, Mapping) or not 1 <= len(grid) <= 3:
         raise ModelError("grid must name one to three components of the state with their values")
     if state0 is None and isinstance(model, Model) and set(model.state_names) <= set(grid):
@@ -218,7 +218,7 @@ def _starts(
 
 
 def _arrays(samples: InitialStates, axes: dict[str, Floats]) -> tuple[Variables, Variables]:
-    """The arrays and the coordinates of the result."""
+    """Return the arrays and the coordinates of the result."""
     model = samples.runner.model
     shape = tuple(len(values) for values in axes.values())
     attractors, number = samples.ranked()
@@ -253,7 +253,7 @@ def _arrays(samples: InitialStates, axes: dict[str, Floats]) -> tuple[Variables,
 
 
 def _table(samples: InitialStates, attractors: list[Attractor]) -> Variables:
-    """The attractors themselves."""
+    """Return the table of the attractors."""
     judge, model = samples.register.judge, samples.runner.model
     mirror = np.zeros(len(attractors), dtype=np.int32)
     for k in range(len(attractors)):

@@ -89,7 +89,7 @@ class InitialStates:
         return np.flatnonzero(kinds[self.place])
 
     def ranked(self) -> tuple[list[Attractor], NDArray[np.int32]]:
-        """The attractors, the largest basin first, and the number of each job's from 1 on."""
+        """Sort attractors by their basins, the largest first, and number the jobs' attractors from 1."""
         counts = np.bincount(self.place[self.place >= 0], minlength=len(self.register.attractors))
         order = np.argsort(-counts, kind="stable")[: int((counts > 0).sum())]
         number = np.zeros(len(counts) + 1, dtype=np.int32)

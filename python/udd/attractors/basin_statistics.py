@@ -15,7 +15,7 @@ _FAR = 0.8  # of what unrelated points would show: beyond this the law bends
 
 
 def basin_fractions(ends: NDArray[np.int32], count: int) -> tuple[Floats, Floats]:
-    """The share of each end among the points of a grid, with standard errors.
+    """Estimate the share of each end among the points of a grid, with standard errors.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class UncertaintyExponent:
 
 
 def uncertainty(ends: NDArray[np.int32]) -> UncertaintyExponent:
-    """The uncertainty exponent of the basins on a grid; `ends` as in :func:`basin_fractions`.
+    """Estimate the uncertainty exponent of the basins on a grid; `ends` as in :func:`basin_fractions`.
 
     Notes
     -----
@@ -113,7 +113,7 @@ def uncertainty(ends: NDArray[np.int32]) -> UncertaintyExponent:
 
 
 def _per_block(ends: NDArray[np.int32], stride: int) -> NDArray[np.int64]:
-    """In each block of the grid, how many pairs at this distance end differently, and how many there are."""
+    """Count the pairs at this distance that end differently, and all pairs, in each block of the grid."""
     block = np.zeros(ends.shape, dtype=np.int64)
     along = round(_BLOCKS ** (1 / ends.ndim))
     for axis, n in enumerate(ends.shape):

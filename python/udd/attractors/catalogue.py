@@ -20,7 +20,7 @@ class AttractorCatalogue:
     attractors: list[Attractor] = field(default_factory=list)
 
     def places(self, crossings: Crossings, verdicts: Classification) -> NDArray[np.int32]:
-        """The place of each job's attractor, -1 where there is none. New ones are added."""
+        """Return the place of each job's attractor, -1 if there is none; add new attractors."""
         result = np.full(len(crossings.outcome), -1, dtype=np.int32)
         known = decided(crossings, verdicts)
         for period in np.unique(verdicts.period[known]).tolist():

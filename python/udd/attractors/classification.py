@@ -30,11 +30,11 @@ class MotionClassifier:
 
     @cached_property
     def tight(self) -> Tightness:
-        """How well points must agree."""
+        """Return the tolerances within which points must agree."""
         return tightness(self.runner.rtol)
 
     def __call__(self, crossings: Crossings, values: Floats) -> Classification:
-        """The verdict on each job; `values` (jobs,) are those of the parameter that varies."""
+        """Classify each job; `values` (jobs,) are those of the parameter that varies."""
         jobs = len(crossings.points)
         whole = np.flatnonzero(crossings.outcome == FINISHED)
         period = np.full(jobs, APERIODIC, dtype=np.int32)
@@ -57,7 +57,7 @@ class MotionClassifier:
         return Classification(period, rest)
 
     def _resting(self, model: Model, states: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which of these states, where little moves, are at an attracting equilibrium; which pass another."""
+        """Return masks of the nearly resting states: at an attracting equilibrium, and passing another."""
         # A diagram also shows orbits that a symmetry keeps on what repels.
         kept = np.flatnonzero(np.isfinite(self.coordinates.size))
         test = rest_test(self.runner, model, self.coordinates)
@@ -78,7 +78,7 @@ class MotionClassifier:
         return rest, passes
 
     def at(self, value: float) -> Model:
-        """The model with a value of the parameter."""
+        """Return the model with a value of the parameter."""
         return self.model if self.parameter is None else self.model.with_parameters({self.parameter: value})
 
     def attractor(self, crossings: Crossings, verdicts: Classification, job: int) -> Attractor:
@@ -109,7 +109,7 @@ class Classification:
         return cls(np.full(jobs, APERIODIC, dtype=np.int32), np.zeros(jobs, dtype=bool))
 
     def only(self, some: NDArray[np.bool_]) -> Classification:
-        """Those of some jobs."""
+        """Return the entries of some jobs."""
         return Classification(self.period[some], self.rest[some])
 
     def put(self, rows: NDArray[np.intp], other: Classification) -> None:
@@ -125,13 +125,13 @@ def put(found: Crossings, rows: NDArray[np.intp], other: Crossings) -> None:
 
 
 def decided(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
-    """Which jobs have ended on an attractor."""
+    """Return a mask of the jobs that have ended on an attractor."""
     known: NDArray[np.bool_] = ((found.outcome == FINISHED) & (verdicts.period != SETTLING)) | verdicts.rest
     return known
 
 
 def followed_on(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
-    """Which jobs still settle: they nearly come back, or nearly rest, and can be followed further."""
+    """Return a mask of the jobs that still settle: they nearly return or rest, and can be continued."""
     some: NDArray[np.bool_] = np.isin(found.outcome, (FINISHED, OUT_OF_TIME))
     some &= verdicts.period == SETTLING
     return some

@@ -15,24 +15,24 @@ Variables: TypeAlias = dict[str, tuple[Any, ...]]
 
 
 def of_flags(words: str, names: Sequence[str]) -> dict[str, Any]:
-    """For an array of places in `names`, by the CF conventions."""
+    """Return the attributes of an array of places in `names`, by the CF conventions."""
     meanings = " ".join(name.replace(" ", "_") for name in names)
     return {"long_name": words, "flag_values": list(range(len(names))), "flag_meanings": meanings}
 
 
 def of_outcomes() -> dict[str, Any]:
-    """For the array ``outcome``."""
+    """Return the attributes of the array ``outcome``."""
     return of_flags("how it ended", ALL_OUTCOMES)
 
 
 def of_state(model: Model, name: str, words: str) -> dict[str, Any]:
-    """For a component of the state."""
+    """Return the attributes of a component of the state."""
     unit = dict(zip(model.state_names, model.state_units, strict=True))[name]
     return {"long_name": f"{name} {words}", "units": unit or "1"}
 
 
 def of_parameter(model: Model, name: str) -> dict[str, Any]:
-    """For a parameter."""
+    """Return the attributes of a parameter."""
     return {"long_name": f"parameter {name}", "units": model.units[name] or "1"}
 
 
@@ -42,7 +42,7 @@ def time_unit(model: Model) -> str:
 
 
 def of_result(runner: SectionRunner, what: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """For the whole: the model, the options, the version."""
+    """Return the attributes of the dataset: the model, the options, the version."""
     return {
         "title": what,
         "model": repr(runner.model),

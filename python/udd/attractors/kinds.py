@@ -74,7 +74,7 @@ def kinds_of(
 
 
 def _turns(judge: MotionClassifier, state: Floats, value: float) -> bool:
-    """Whether a state at rest is one of rotation."""
+    """Return True if a state at rest is a rotation."""
     model, coordinates = judge.at(value), judge.coordinates
     rotation = model.profile.dynamics.rotation
     if rotation is not None:

@@ -14,7 +14,7 @@ from .attractor import Attractor, alike, distance_between, mirrored
 
 
 def groups(found: list[Attractor], tight: Tightness) -> list[int]:
-    """For each attractor the place of the first that is the same."""
+    """Return the place of the first equal attractor for each attractor."""
     first: list[int] = []
     for k, attractor in enumerate(found):
         same = (j for j in sorted(set(first)) if alike(found[j], attractor, tight))
@@ -23,7 +23,7 @@ def groups(found: list[Attractor], tight: Tightness) -> list[int]:
 
 
 def mirror_images(found: list[Attractor], of: int, coordinates: Coordinates, tight: Tightness) -> list[int]:
-    """The places of the mirror images of one of them, itself included where it is its own."""
+    """Return the places of an attractor's mirror images, its own included if it is symmetric."""
     images = [mirrored(found[of], sign, coordinates) for sign in coordinates.mirrors]
     return [k for k, other in enumerate(found) if any(alike(image, other, tight) for image in images)]
 
@@ -40,7 +40,7 @@ class AttractorMatcher:
     last: dict[int, Attractor] = field(default_factory=dict)
 
     def label(self, attractors: list[Attractor]) -> list[int]:
-        """The labels of the distinct attractors at the next value."""
+        """Label the distinct attractors at the next value."""
         from scipy.optimize import linear_sum_assignment
 
         last_attractors = list(self.last)
@@ -59,7 +59,7 @@ class AttractorMatcher:
 
 
 def intervals(where: NDArray[np.bool_], unknown: NDArray[np.bool_], values: Floats) -> Floats:
-    """The first and last value of every stretch, shape (stretches, 2); what is unknown does not end one."""
+    """Return the first and last value of every stretch, shape (stretches, 2); unknown values end none."""
     result: list[list[float]] = []
     open_ = False
     for value, here, gap in zip(values.tolist(), where.tolist(), unknown.tolist(), strict=True):

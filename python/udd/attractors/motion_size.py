@@ -1,4 +1,4 @@
-"""How large the motions are whose attractors are compared."""
+"""Size of the motions whose attractors are compared."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SAMPLES = 1000
 
 
 def rest_test(runner: SectionRunner, model: Model, coordinates: Coordinates) -> RestTest:
-    """The test whether orbits of a model settle at an equilibrium."""
+    """Make the test for orbits that settle at an equilibrium."""
     kept = np.flatnonzero(np.isfinite(coordinates.size))
     longest = _LONGEST * runner.t_each
     return RestTest(model, kept, coordinates.clock, longest, runner.rtol, runner.atol)
@@ -31,7 +31,7 @@ def rest_test(runner: SectionRunner, model: Model, coordinates: Coordinates) -> 
 def sized_by_motion(
     runner: SectionRunner, row: Floats, starts: Floats, transient: int, n: int
 ) -> tuple[Coordinates, bool]:
-    """The coordinates for orbits from states (jobs, dim), and whether Ctrl-C stopped the search for them.
+    """Return the coordinates for orbits from states (jobs, dim), and True if Ctrl-C stopped the search.
 
     Warn if runs lose components below `atol`.
 
@@ -66,7 +66,7 @@ def sized_by_motion(
 
 
 def _range(runner: SectionRunner, start: Floats, span: float) -> Floats:
-    """The range of each component along an orbit, zero if it ends before."""
+    """Return the range of each component along an orbit, zero if it ends before."""
     states = states_along(runner.model, span, _SAMPLES, start, runner.rtol, runner.atol)
     result: Floats = np.zeros(len(start)) if states is None else np.ptp(states, axis=0)
     return result

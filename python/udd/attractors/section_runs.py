@@ -36,7 +36,7 @@ class Crossings:
     t_end: Floats
 
     def only(self, some: NDArray[np.bool_]) -> Crossings:
-        """Those of some jobs."""
+        """Return the crossings of some jobs."""
         return Crossings(
             self.points[some], self.t[some], self.outcome[some], self.end[some], self.t_end[some]
         )

@@ -53,7 +53,7 @@ class Fate:
 
     @property
     def ordered(self) -> bool:
-        """Whether the orbit comes back, rests, or goes to infinity."""
+        """Return True if the orbit returns, rests, or goes to infinity."""
         return self.kind in ("equilibrium", "periodic orbit", "escapes")
 
 
@@ -73,7 +73,7 @@ class Orbit:
 
     @cached_property
     def timed(self) -> bool:
-        """Whether the rates depend on time."""
+        """Return True if the rates depend on time."""
         size = np.where(np.isfinite(self._coordinates.size), self._coordinates.size, 1.0)
         return depends_on_time(self.model, size, 0.7371 * self._coordinates.clock)
 
@@ -82,7 +82,7 @@ class Orbit:
         return coordinates_of(self.model, np.ones((1, len(self.model.state_names))))
 
     def points(self, start: _Floats, section: str | Sequence[str] | None = None, **few: Any) -> Section:
-        """Where the orbit crosses a surface from here on."""
+        """Return the crossings of a surface from here on."""
         from .poincare_sections import poincare
 
         options = {"n": _POINTS, "transient": 0, "rtol": self.rtol, "atol": self.atol, "threads": 1, **few}
@@ -93,7 +93,7 @@ class Orbit:
     def points_if_any(
         self, start: _Floats, section: str | Sequence[str] | None = None, **few: Any
     ) -> Section:
-        """The same, without a warning if there are fewer."""
+        """Return the crossings of a surface, without a warning if there are fewer."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IncompleteWarning)
             warnings.simplefilter("ignore", ToleranceWarning)
@@ -154,12 +154,12 @@ class Orbit:
             skip = _POINTS if late else 2 * skip + _POINTS
 
     def _turned_back(self, state: _Floats) -> _Floats:
-        """A state without whole turns of its angles, which cost digits."""
+        """Return the state without whole turns of its angles, which cost digits."""
         angle = np.array([name in self.model.angles for name in self.model.state_names])
         return np.where(angle, np.arctan2(np.sin(state), np.cos(state)), state)
 
     def _across(self, state: _Floats) -> str:
-        """The plane through a state across the flow, modulo turns of angles: what recurs crosses it."""
+        """Return the plane through a state across the flow, modulo turns: recurrent orbits cross it."""
         names, rates = self.model.state_names, self.model.rates(0.0, state)
         largest = np.abs(rates[self.kept]).max(initial=0.0) or 1.0
         terms = []
@@ -170,7 +170,7 @@ class Orbit:
         return " + ".join(terms)
 
     def _compared(self, state: _Floats, clock: float) -> tuple[Coordinates, Tightness]:
-        """How states are compared: by the extent of the motion, if the model has no sizes of its own."""
+        """Return the coordinates of comparison: by the extent of the motion, if the model has no sizes."""
         if self.model.profile.dynamics.sizes is not None:
             return coordinates_of(self.model, state[None]), tightness(self.rtol)
         run = self._sampled(state, _RETURNS * clock)
@@ -190,7 +190,7 @@ class Orbit:
         return states_along(self.model, span, _SAMPLES + 1, state, self.rtol, self.atol)
 
     def unbounded(self, state: _Floats, clock: float | None = None) -> bool:
-        """Whether a component that is no angle grows without bound: each time that the time doubles."""
+        """Return True if a component, not an angle, grows without bound each time that the time doubles."""
         plain = [k for k, name in enumerate(self.model.state_names) if name not in self.model.angles]
         span = _RETURNS * (self._coordinates.clock if clock is None else clock)
         first = last = None

@@ -249,7 +249,7 @@ def _tell(outcomes: list[int], n: int, single: bool, failure: str | None) -> Non
 
 
 def reason(outcome: str, failure: str | None) -> str:
-    """Why a run that ended so, by this failure, has no exponents."""
+    """Return the reason why a run with this failure has no exponents."""
     reasons = {
         "ejected": 'the disk left the wheels; use edge="ignore" for the exponents of the equations',
         "failed": failure or "the solution blew up",

@@ -403,7 +403,7 @@ def poincare(
 def surfaces_of(
     model: Model, section: str | Sequence[str] | None, direction: str | Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """The expressions, and the signs of the directions in which they are crossed."""
+    """Return the expressions, and the signs of the directions in which they are crossed."""
     if section is None:
         section = model.profile.dynamics.section or f"maxima of {model.state_names[0]}"
     texts = [section] if isinstance(section, str) else section
@@ -420,7 +420,7 @@ def surfaces_of(
 
 
 def _surface(model: Model, text: str, direction: str | None) -> tuple[str, int]:
-    """A name as an expression."""
+    """Return the expression of a named surface."""
     if direction is not None and direction not in _DIRECTIONS:
         raise ModelError(f'direction must be "up", "down" or "both", not {direction!r}')
     extremum = _EXTREMUM.fullmatch(text.strip())
@@ -445,7 +445,7 @@ def _smallness(starts: _Floats) -> float:
 
 
 def clock_of(model: Model, rows: _Floats) -> float:
-    """A typical time between crossings, that of the slowest orbit; `rows` are the orbits' parameters."""
+    """Return the typical time between crossings of the slowest orbit; `rows` are the orbits' parameters."""
     p = dict(zip(model.parameters, rows.T, strict=True))
     crossing_rate = model.profile.dynamics.crossing_rate
     rate = np.full(len(rows), 0.1) if crossing_rate is None else crossing_rate(p)

@@ -1,4 +1,4 @@
-"""Whether points on a section come back: periods, and what has not settled yet."""
+"""Recurrence of points on a section: periods, and motions that still settle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEAST = 12
 
 @dataclass(frozen=True)
 class Tightness:
-    """How well points must agree, in the coordinates of :mod:`udd.models.state_scaling`.
+    """Tolerances of recurrence, in the coordinates of :mod:`udd.models.state_scaling`.
 
     Attributes
     ----------
@@ -36,14 +36,14 @@ class Tightness:
 
 
 def tightness(rtol: float) -> Tightness:
-    """For runs with this tolerance."""
+    """Return the tolerances for runs with this `rtol`."""
     noise = 30.0 * rtol + 1e-11
     settled = max(1e-4, 100.0 * noise)
     return Tightness(noise, settled, 10.0 * settled)
 
 
 def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
-    """The number of section points after which each motion comes back.
+    """Count the section points after which each motion comes back.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
 
 
 def _changes(points: Floats, p: int) -> tuple[Floats, Floats]:
-    """The last change from period to period, and what is to come of it."""
+    """Return the last change from period to period, and the expected remaining change."""
     n = points.shape[1]
     change = np.abs(points[:, p:] - points[:, :-p]).max(axis=2)
     late = change[:, -p:].max(axis=1)
@@ -103,7 +103,7 @@ def _changes(points: Floats, p: int) -> tuple[Floats, Floats]:
 
 
 def _shortest(points: Floats, period: int, close: float) -> NDArray[np.int32]:
-    """The smallest divisor of the period after which the points are back as well as they are known.
+    """Return the smallest divisor of the period after which the points agree within their errors.
 
     Near a period doubling the shorter period settles last, with its points now on this side, now on that.
     """

@@ -1,4 +1,4 @@
-"""Whether an orbit settles at an equilibrium: by Newton's method, the eigenvalues there, and the orbit."""
+"""Test for an equilibrium: Newton's method, the eigenvalues there, and the orbit."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class Equilibrium(NamedTuple):
 
     @property
     def repels(self) -> bool:
-        """Whether an eigenvalue has a positive real part: no attractor has one."""
+        """Return True if an eigenvalue has a positive real part: no attractor has one."""
         return bool((self.eigenvalues.real > _ZERO * np.abs(self.eigenvalues).max(initial=0.0)).any())
 
 
 def equilibrium_near(model: Model, state: _Floats, kept: NDArray[np.intp], t: float) -> Equilibrium | None:
-    """The equilibrium to which Newton's method goes from a state (dim,), with the components `kept`."""
+    """Find the equilibrium near a state (dim,) by Newton's method, with the components `kept`."""
     place, gone = np.array(state, dtype=np.float64), np.zeros(len(kept))
     first: _Floats | None = None
     with np.errstate(all="ignore"):
@@ -75,7 +75,7 @@ def equilibrium_near(model: Model, state: _Floats, kept: NDArray[np.intp], t: fl
 
 @dataclass(frozen=True)
 class RestTest:
-    """Whether orbits of a model settle at an equilibrium that attracts, or rest on one that does not.
+    """Test for orbits of a model that settle at an attracting equilibrium, or rest on another.
 
     An equilibrium is one of the components `kept`: angles on which nothing depends may turn. Distances are
     compared with those that the orbit itself passes through, so that neither the origin nor the units count.
@@ -100,7 +100,7 @@ class RestTest:
     atol: float
 
     def __call__(self, state: _Floats, attracts: bool = False) -> Equilibrium | None:
-        """The equilibrium at which the orbit from a state (dim,) settles, or None.
+        """Return the equilibrium at which the orbit from a state (dim,) settles, or None.
 
         With `attracts`, one that repels is none, even if the orbit rests on it.
         """
@@ -122,7 +122,7 @@ class RestTest:
         return self._settled(state, rest, noise)
 
     def _settled(self, state: _Floats, rest: Equilibrium, noise: _Floats) -> Equilibrium | None:
-        """The equilibrium that an orbit has come near to after several times its slowest decay."""
+        """Return the equilibrium that an orbit is near after several times its slowest decay."""
         if not rest.repels and (np.abs(state[self.kept] - rest.state) <= noise).all():
             return rest
         real = rest.eigenvalues.real

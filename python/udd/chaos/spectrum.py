@@ -298,7 +298,7 @@ def lyapunov_spectrum(
 
 
 def _verdict(run: _Run, fate: Fate, orbits: _core._Orbits) -> str:
-    """The verdict: the fate of the orbit if the exponents agree with it, else what the exponents say."""
+    """Return the fate of the orbit if the exponents agree with it, else the verdict of the exponents."""
     time_scale = run.model.time_scale
     zeros = _zeros(run, orbits)
     if fate.kind == "periodic orbit":
@@ -323,7 +323,7 @@ def _verdict(run: _Run, fate: Fate, orbits: _core._Orbits) -> str:
 
 
 def _neither_settles_nor_parts(run: _Run, fate: Fate, orbits: _core._Orbits) -> bool:
-    """Whether distances in two directions stayed as they were for the whole of a long run.
+    """Return True if distances in two directions stayed the same for the whole of a long run.
 
     A torus that nearly comes back looks as if it settled, but what settles shrinks meanwhile.
     """
@@ -335,7 +335,7 @@ def _neither_settles_nor_parts(run: _Run, fate: Fate, orbits: _core._Orbits) -> 
 
 
 def _zeros(run: _Run, orbits: _core._Orbits) -> int:
-    """In how many directions distances stay as they are, beside angles that nothing depends on.
+    """Count the directions in which distances stay the same, without angles that nothing depends on.
 
     Time is a direction, too, if the rates depend on it.
     """
@@ -345,7 +345,7 @@ def _zeros(run: _Run, orbits: _core._Orbits) -> int:
 
 
 def _positive(orbits: _core._Orbits, time_scale: float) -> bool:
-    """Whether neighbouring orbits part, and faster than by any power of the time up to the second.
+    """Return True if neighbouring orbits separate faster than by any power of the time up to the second.
 
     Where energy is kept those of regular motion part in proportion to time. The scatter of an exponent's
     means does not show that: all of them are above zero.
@@ -365,7 +365,7 @@ class _Run(Orbit):
         return _core.lyapunov(batch, True, time, skipped, goal)
 
     def look(self, start: _Floats, time: float, skipped: float, goal: float) -> tuple[_core._Orbits, Fate]:
-        """The exponents of a run, and what becomes of the orbit after it."""
+        """Compute the exponents of a run, and follow the orbit after it."""
         orbits = self(start, time, skipped, goal)
         outcome, end = int(orbits["outcome"][0]), orbits["end"][0]
         if outcome == FINISHED:
@@ -382,7 +382,7 @@ class _Run(Orbit):
 
 
 def kaplan_yorke(exponents: ArrayLike) -> float:
-    """The Kaplan-Yorke dimension of exponents in falling order.
+    """Compute the Kaplan-Yorke dimension [21] of exponents in decreasing order.
 
     Parameters
     ----------
@@ -410,7 +410,7 @@ def kaplan_yorke(exponents: ArrayLike) -> float:
 
 
 def _invariants(model: Model, exponents: _Floats, mean: _Floats, product: _Floats) -> dict[str, float]:
-    """How far exact averages are from what they must be.
+    """Return the deviations of exact averages from their values.
 
     They follow from the rates of functions of the state, which average to zero on bounded orbits.
     """

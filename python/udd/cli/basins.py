@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> CommandResult:
 
 
 def _cycles(model: Model, result: xr.Dataset) -> dict[int, dict[str, Any]]:
-    """The cycle of each attractor that is one."""
+    """Return the cycle of each periodic attractor."""
     from udd.bifurcations import periodic_orbit
 
     cycles = {}
@@ -124,7 +124,7 @@ def _component(text: str) -> tuple[str, Any]:
 
 
 def summary_of(result: xr.Dataset) -> dict[str, Any]:
-    """The basins without the grid: the attractors, the fractions, the exponent."""
+    """Return the basins without the grid: the attractors, the fractions, the exponent."""
     kinds = str(result["kind"].attrs["flag_meanings"]).split()
     table = [
         {

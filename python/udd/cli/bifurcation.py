@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> CommandResult:
 
 
 def summary_of(diagram: xr.Dataset) -> dict[str, Any]:
-    """The diagram without its points: outcomes, stretches of one period on one attractor, hysteresis."""
+    """Return the diagram without its points: outcomes, stretches of one period, hysteresis."""
     parameter = diagram.attrs["parameter"]
     outcomes = diagram["outcome"]
     names = str(outcomes.attrs["flag_meanings"]).split()

@@ -139,7 +139,7 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
 
 
 def _period(text: str | None) -> float | str | None:
-    """A number, or a formula of the parameters."""
+    """Read a number, or a formula of the parameters."""
     try:
         return None if text is None else float(text)
     except ValueError:

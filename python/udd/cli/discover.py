@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> CommandResult:
 
 
 def held_out_of(args: argparse.Namespace) -> list[int] | None:
-    """The numbers of the files that no fit sees; refused before films are tracked for it."""
+    """Return the numbers of the held-out files; errors come before films are tracked."""
     if args.held_out is None:
         return None
     if args.each is not None:

@@ -1,4 +1,4 @@
-"""From the arguments to the exit code."""
+"""Entry of the command line: from the arguments to the exit code."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def check_ending(path: Path, endings: tuple[str, ...]) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, data: tuple[str, ...] = DATA) -> None:
-    """Where to write."""
+    """Add the option for the output file."""
     kinds = ", ".join((*data, *PICTURES))
     parser.add_argument(
         "--out",

@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> CommandResult:
 
 
 def describe(prediction: Forecast) -> str:
-    """A forecast in a few lines."""
+    """Describe a forecast in a few lines."""
     unit, factor = small_unit(prediction.fit.model.profile.sensor.error_unit)
     within = f"{factor * prediction.error:.3g} {unit}"
     reach = prediction.t[-1] - prediction.start
@@ -142,7 +142,7 @@ def _write(path: Path, prediction: Forecast) -> None:
 
 
 def _csv(prediction: Forecast) -> str:
-    """The curves: t, then median, low and high of each channel."""
+    """Return the curves as text: t, then median, low and high of each channel."""
     head = ["t", *(f"{name}{end}" for name in prediction.names for end in ("", "_low", "_high"))]
     rows = [",".join(head)]
     for k, t in enumerate(prediction.t.tolist()):

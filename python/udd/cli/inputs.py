@@ -37,7 +37,7 @@ _CUT = 0.01  # share of the promised frames that may be missing
 
 
 def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
-    """A file, or several of one device, and what is known of it."""
+    """Add options for a file, or several of one device, and its constants."""
     parser.add_argument(
         "files",
         metavar="FILE",
@@ -122,7 +122,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
 
 
 def is_film(path: Path) -> bool:
-    """Whether a file is a film, by its name or else its first bytes; all others are read as tables."""
+    """Return True if a file is a film, by its name or else its first bytes; others are tables."""
     if path.suffix.lower() in _FILMS:
         return True
     try:
@@ -171,12 +171,12 @@ def inputs_of(args: argparse.Namespace) -> Inputs:
 
 
 def _each(args: argparse.Namespace) -> list[argparse.Namespace]:
-    """The same options for each file alone."""
+    """Yield the same options for each file."""
     return [argparse.Namespace(**{**vars(args), "file": file}) for file in args.files]
 
 
 def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
-    """The measurement in a file, and the film if it is one."""
+    """Read the measurement in a file, and return the film if it is one."""
     constants = {"W": args.W, "R": args.R}
     if not is_film(args.file):
         from udd.measurement import read_measurement
@@ -268,7 +268,7 @@ def whole(args: argparse.Namespace, measure: Callable[[], Measurement]) -> Measu
 
 
 def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
-    """The known model: what the command line says wins over the measurement's header."""
+    """Make the known model; the command line takes precedence over the measurement's header."""
     if args.model is not None:
         return own_model(args)
     if measurement.kind == "pendulum":
@@ -298,7 +298,7 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
 
 
 def _pendulum(args: argparse.Namespace, measurement: Measurement) -> Pendulum:
-    """A pendulum; without --pendulum its size is the header's."""
+    """Make a pendulum; without --pendulum its size comes from the header."""
     refuse_others(args, "pendulum", f"{args.file} is a pendulum's record: ")
     length, inertia = args.pendulum, args.inertia
     if length is None:
@@ -314,7 +314,7 @@ def _pendulum(args: argparse.Namespace, measurement: Measurement) -> Pendulum:
 
 
 def own_model(args: argparse.Namespace) -> FormulaModel:
-    """The user's own model, from its file."""
+    """Make the user's own model from its file."""
     from udd.models.mechanisms import check_accelerations
     from udd.models.serialization import formula_model_from_dict
 
@@ -328,7 +328,7 @@ def own_model(args: argparse.Namespace) -> FormulaModel:
 
 
 def start_of(args: argparse.Namespace) -> Any:
-    """Where hidden states start, as the file of the user's own model says; None where it does not."""
+    """Return the start of hidden states in the file of the user's own model; None if it has none."""
     return None if args.model is None else _model_file(args).get("state0")
 
 
@@ -346,7 +346,7 @@ def _option_or_header(args: argparse.Namespace, measurement: Measurement, name: 
 
 
 def _number(args: argparse.Namespace, measurement: Measurement, name: str) -> float | None:
-    """A number in the file's header."""
+    """Read a number in the file's header."""
     value = measurement.meta.get(name)
     if value is None:
         return None
@@ -371,7 +371,7 @@ def check_early(args: argparse.Namespace) -> None:
 
 
 def free_of(args: argparse.Namespace) -> list[str] | None:
-    """The parameters that --free names; None where they are the model's own."""
+    """Return the parameters that --free names; None for the model's default."""
     if args.free is None:
         return None
     free = names(args.free)

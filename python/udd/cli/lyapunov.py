@@ -174,7 +174,7 @@ def _require(model: Model, name: str) -> None:
 
 
 def _exponents(swept: _Swept, args: argparse.Namespace) -> Iterator[list[_Row]]:
-    """The largest exponents, some values at a time.
+    """Compute the largest exponents, some values at a time.
 
     `udd.lyapunov` would take all at once, but gives nothing before the end, and on Ctrl-C nothing at all.
     Here a portion has a packet of orbits for each core at first, and grows while it takes less than a second.
@@ -204,7 +204,7 @@ def _exponents(swept: _Swept, args: argparse.Namespace) -> Iterator[list[_Row]]:
 
 
 def _spectra(swept: _Swept, args: argparse.Namespace) -> Iterator[list[_Row]]:
-    """All exponents, value by value."""
+    """Compute all exponents, value by value."""
     from udd.chaos.spectrum import lyapunov_spectrum
 
     for value in swept.values:

@@ -26,7 +26,7 @@ def add_models(parser: argparse.ArgumentParser) -> None:
 
 
 def add_others(parser: argparse.ArgumentParser) -> None:
-    """The models other than the dimensionless equations."""
+    """Add the models other than the dimensionless equations."""
     add_disk(parser, "drive speed of the disk [m/s]")
     parser.add_argument(
         "--ignore-edge", action="store_true", help="follow the disk's equations beyond its edge"
@@ -36,7 +36,7 @@ def add_others(parser: argparse.ArgumentParser) -> None:
 
 
 def add_own(parser: argparse.ArgumentParser) -> None:
-    """A model of the user's own."""
+    """Add the options of a user's own model."""
     parser.add_argument(
         "--model",
         type=Path,
@@ -47,13 +47,13 @@ def add_own(parser: argparse.ArgumentParser) -> None:
 
 
 def add_dle(parser: argparse.ArgumentParser) -> None:
-    """The dimensionless equations."""
+    """Add the options of the dimensionless equations."""
     parser.add_argument("--w", type=float, help="drive of the dimensionless equations (DLE)")
     parser.add_argument("--B", type=float, help="their damping (default 0)")
 
 
 def model_of(args: argparse.Namespace, varied: Mapping[str, float]) -> Model:
-    """The model; a drive that is varied says which, and has its first value."""
+    """Make the model; a varied drive has its first value, and selects the model."""
     drives = {name: getattr(args, name) for name in ("W", "w", "pendulum")}
     for name in ("W", "w"):
         if name in varied and getattr(args, "model", None) is None:
@@ -62,7 +62,7 @@ def model_of(args: argparse.Namespace, varied: Mapping[str, float]) -> Model:
 
 
 def chosen(args: argparse.Namespace, drives: Mapping[str, float | None]) -> Model:
-    """The model whose drive or length is given, with its options; those of others are refused."""
+    """Make the model whose drive or length is given, and refuse options of other models."""
     from udd.models import DLE
 
     w, length, W = drives["w"], drives["pendulum"], drives["W"]
@@ -92,7 +92,7 @@ def check_component(model: Model, name: str | None) -> None:
 
 
 def add_runs(parser: argparse.ArgumentParser, points: int) -> None:
-    """How every motion is followed."""
+    """Add the options of runs."""
     parser.add_argument(
         "--points", type=int, default=points, help=f"section points of each motion (default {points})"
     )
@@ -129,7 +129,7 @@ def check_count(name: str, value: int, least: int) -> None:
 
 
 def starts_of(args: argparse.Namespace) -> list[list[float]] | None:
-    """The initial states, if any are given; of a model of one's own that which its file gives."""
+    """Return the given initial states, or that of the user's own model."""
     if args.state is not None:
         return [numbers([text], "--state") for text in args.state]
     start = own_start(args)
@@ -137,7 +137,7 @@ def starts_of(args: argparse.Namespace) -> list[list[float]] | None:
 
 
 def own_start(args: argparse.Namespace) -> list[float] | None:
-    """The initial state in the file of the user's own model, None if it gives none.
+    """Return the initial state in the file of the user's own model, None if it gives none.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def new(
 
 
 def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
-    """The disk's parameters."""
+    """Add the disk's parameters."""
     group = parser.add_argument_group("the disk")
     speed = group.add_mutually_exclusive_group()
     speed.add_argument("--W", type=float, metavar="M/S", help=drive)
@@ -57,7 +57,7 @@ def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
 
 
 def _rim_speed(text: str) -> float:
-    """The speed of a wheel's rim from ``rate`` or ``rate:radius``."""
+    """Compute the speed of a wheel's rim from ``rate`` or ``rate:radius``."""
     rate, colon, radius = text.partition(":")
     try:
         speed = number_in(rate) * (number_in(radius) if colon else 0.03)
@@ -129,7 +129,7 @@ def _doubt(name: str, value: float, most: float, unit: str, usual: str) -> None:
 
 
 def disk(args: argparse.Namespace, W: float, R: float) -> Disk:
-    """The disk that the options describe."""
+    """Make the disk that the options describe."""
     from udd.models import Disk
 
     _doubt("W", W, _FAST, "m/s", "about 0.04 m/s")
@@ -138,7 +138,7 @@ def disk(args: argparse.Namespace, W: float, R: float) -> Disk:
 
 
 def pendulum(args: argparse.Namespace, length: float, inertia: float | None) -> Pendulum:
-    """The pendulum that the options describe."""
+    """Make the pendulum that the options describe."""
     from udd.models import Pendulum
 
     _doubt("length", length, _LONG, "m", f"at most {_LONG:g} m")
@@ -146,12 +146,12 @@ def pendulum(args: argparse.Namespace, length: float, inertia: float | None) -> 
 
 
 def given(args: argparse.Namespace, *names: str) -> dict[str, Any]:
-    """The options among these that were given."""
+    """List the given ones among these options."""
     return {name: getattr(args, name) for name in names if getattr(args, name) is not None}
 
 
 def add_pendulum(parser: argparse.ArgumentParser, length: str = "pivot to centre of mass [m]") -> None:
-    """A pendulum instead."""
+    """Add the options of a pendulum."""
     group = parser.add_argument_group("a pendulum instead of the disk")
     group.add_argument("--pendulum", type=float, metavar="LENGTH", help=length)
     group.add_argument(

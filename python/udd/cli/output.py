@@ -110,7 +110,7 @@ class _Lines:
 
 
 def _topic(text: str) -> str:
-    """A text without its numbers: what is counted."""
+    """Return a text without its numbers, to count similar texts."""
     return "".join(letter for letter in text if not (letter.isdigit() or letter in ".,"))
 
 

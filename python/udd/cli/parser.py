@@ -86,7 +86,7 @@ class _Version(argparse.Action):
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+    """Make the parser of the whole command line."""
     parser = Parser(
         prog="udd",
         usage="udd [--version] [--help] COMMAND ...",

@@ -131,7 +131,7 @@ def _mean_gap(found: Section) -> float:
 
 
 def _lines(section: Section) -> list[str]:
-    """The table, to the last digit."""
+    """Return the lines of the table, to the last digit."""
     several = len(section.section) > 1
     head = ["t", *section.model.state_names] + (["section"] if several else [])
     rows = [",".join(head)]

@@ -123,7 +123,7 @@ def _model(args: argparse.Namespace) -> Model:
 
 
 def _csv(result: Trajectory) -> Iterator[str]:
-    """The run in the format of a measurement, line by line, with every digit."""
+    """Yield the run in the format of a measurement, line by line, with every digit."""
     model = result.model
     for name, value in model.parameters.items():
         yield f"# {name} = {value!r}\n"

@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> CommandResult:
 
 
 def _counted(result: xr.Dataset) -> dict[str, Any]:
-    """How many trajectories have which outcome."""
+    """Count the trajectories of each outcome."""
     outcome = result["outcome"]
     ends = outcome.to_numpy()  # a byte each
     names = str(outcome.attrs["flag_meanings"]).split()

@@ -215,7 +215,7 @@ def _explain(args: argparse.Namespace, options: dict[str, Any], reason: str) -> 
 
 
 def _code(m: Measurement) -> int:
-    """The exit code: 3 if the track is doubtful."""
+    """Return the exit code: 3 if the track is doubtful."""
     return DOUBTFUL if m.meta.get("doubts") else 0
 
 
@@ -256,7 +256,7 @@ _SAID = (
 
 
 def _command(args: argparse.Namespace) -> str:
-    """The command that makes the page again."""
+    """Return the command that makes the page again."""
     words = ["udd", "track", args.file.name]
     for name in _SAID:
         value = getattr(args, name)
@@ -311,7 +311,7 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _rates(said: str | None) -> Any:
-    """From 240, or from 30,61:240,301:30."""
+    """Read rates such as 240 or 30,61:240,301:30."""
     if said is None:
         return None
     rates = []
@@ -340,7 +340,7 @@ def _bob(said: str) -> Any:
 
 
 def _calibrate(said: str) -> dict[str, Any]:
-    """From lens=off,readout=0.02."""
+    """Read items such as lens=off,readout=0.02."""
     items: dict[str, Any] = {}
     for part in said.split(","):
         name, equals, value = (x.strip() for x in part.partition("="))

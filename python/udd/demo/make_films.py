@@ -1,4 +1,4 @@
-"""How the sample films were made: ``python -m udd.demo.make_films`` makes them again.
+"""Source of the sample films: ``python -m udd.demo.make_films`` makes them again.
 
 Two films of the same device, camera and drive. In `sample.mp4` the rolling constraint is relaxed, which the
 known model of the demonstration lacks; in `sample_null.mp4` nothing is added to the model.
@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
 
 
 def between_wheels(effects: tuple[Effect, ...], seed: int) -> Trajectory:
-    """A run that stays between the wheels, from the first of random starts that does."""
+    """Return the first run from random starts that stays between the wheels."""
     random = np.random.default_rng(seed)
     model = Disk(DRIVE, effects=effects)
     times = np.arange(0.0, DURATION, 0.005)

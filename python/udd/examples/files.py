@@ -1,4 +1,4 @@
-"""Where the example files are, and copies of them in a folder of the user's."""
+"""Places of the example files, and copies of them in a folder of the user's."""
 
 from __future__ import annotations
 

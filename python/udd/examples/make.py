@@ -1,4 +1,4 @@
-"""How the example tables were made: ``python -m udd.examples.make`` makes them again."""
+"""Source of the example tables: ``python -m udd.examples.make`` makes them again."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def main(folder: Path) -> None:
 
 
 def tables() -> dict[str, str]:
-    """The example files by name."""
+    """Return the example files by name."""
     return {
         "disk.csv": disk(),
         "pendulum.csv": pendulum(),
@@ -46,7 +46,7 @@ def tables() -> dict[str, str]:
 
 
 def disk(W: float = 0.042, b: float = 6.0, seconds: float = 30.0, seed: int = 1) -> str:
-    """A disk at 25 frames a second; the wheels lift it less the further from them its centre is."""
+    """Make the record of a disk at 25 frames a second; the wheels lift it less far from the contact."""
     t = np.arange(0.0, seconds, 0.04)
     effects = (_effect("relaxation", momentum="constraint", b=b),) if b else ()
     state = integrated(Disk(W, effects=effects), t, [2.0, 0.02, -0.02, 0.0], rtol=1e-9, atol=1e-12).state
@@ -55,7 +55,7 @@ def disk(W: float = 0.042, b: float = 6.0, seconds: float = 30.0, seed: int = 1)
 
 
 def pendulum(seed: int = 2) -> str:
-    """A pendulum of 0.65 m that the air resists with the square of its speed."""
+    """Make the record of a pendulum of 0.65 m with quadratic drag."""
     t = np.arange(0.0, 40.0, 0.05)
     model = Pendulum(0.65, k0=0.005, effects=(_effect("quadratic_drag", c=0.02),))
     theta = integrated(model, t, [0.0, 1.0], rtol=1e-9, atol=1e-12).state[:, 1]
@@ -64,7 +64,7 @@ def pendulum(seed: int = 2) -> str:
 
 
 def phone(seed: int = 3) -> str:
-    """A phone's gyroscope on a pendulum of 0.8 m: it turns about x, and its zero is off."""
+    """Make the record of a phone's gyroscope on a pendulum of 0.8 m, with an offset, about x."""
     t = np.arange(0.0, 30.0, 0.02)
     rate = integrated(Pendulum(0.8, k0=0.012), t, [0.0, 0.6], rtol=1e-9, atol=1e-12).state[:, 0]
     noise = 0.01 * np.random.default_rng(seed).normal(size=(len(t), 3))
@@ -75,7 +75,7 @@ def phone(seed: int = 3) -> str:
 
 
 def driven(seed: int = 4) -> str:
-    """A pendulum that a motor drives in air, whose drag the model lacks: it grows with the speed squared."""
+    """Make the record of a driven pendulum in air, whose model lacks the quadratic drag."""
     random = np.random.default_rng(seed)
     t = np.arange(0.0, 30.0, 0.03)
     torque = 0.9 * np.sin(1.3 * t) + 0.6 * np.sin(2.9 * t + 1.0) + 0.3 * np.sin(0.4 * t)
@@ -93,7 +93,7 @@ def _effect(name: str, momentum: str | None = None, **values: float) -> Any:
 
 
 def _text(meta: dict[str, float], head: str, t: Array, columns: Array, digits: tuple[int, ...]) -> str:
-    """A table with so many decimals in each column."""
+    """Return a table with the given decimals in each column."""
     lines = [*(f"# {key} = {value}" for key, value in meta.items()), head]
     for row in np.column_stack([t, columns]).tolist():
         lines.append(",".join(f"{value:.{n}f}" for value, n in zip(row, digits, strict=True)))

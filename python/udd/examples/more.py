@@ -61,7 +61,7 @@ def _written(target: Path, content: bytes) -> Path:
 
 
 def _clock(target: Path) -> Path:
-    """The film of a plain pendulum: a red bob before a grey wall."""
+    """Make the film of a plain pendulum: a red bob before a grey wall."""
     from udd.models import Pendulum
     from udd.simulation.trajectory import integrated
     from udd.video.writer import write_film

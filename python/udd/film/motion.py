@@ -1,4 +1,4 @@
-"""Where the disk is at any time: a smooth curve through the samples of a trajectory."""
+"""Place of the disk at any time: a smooth curve through the samples of a trajectory."""
 
 from __future__ import annotations
 

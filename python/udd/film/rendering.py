@@ -266,7 +266,7 @@ def _frames(
 
 
 def _patches(layout: Sequence[Mapping[str, Any]] | None, radius: float) -> list[Patch] | None:
-    """The marks of a layout as patches in units of the disk's radius."""
+    """Return the marks of a layout as patches in units of the disk's radius."""
     if layout is None:
         return None
     from udd.markers.layout import read_layout

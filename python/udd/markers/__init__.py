@@ -1,1 +1,1 @@
-"""Where marks and tags sit on the disk."""
+"""Places of marks and tags on the disk."""

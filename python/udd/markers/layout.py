@@ -1,4 +1,4 @@
-"""Where the marks sit on the disk, and in which colours; the standard four, or any two or more by hand."""
+"""Places and colours of the marks on the disk: the standard four, or any two or more by hand."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ STANDARD = Layout(
 
 
 def read_layout(said: Any) -> Layout:
-    """A layout from marks as ``{"at": [y, z], "colour": "red"}`` (m at beta = 0; or an sRGB triple).
+    """Read a layout from marks as ``{"at": [y, z], "colour": "red"}`` (m at beta = 0; or an sRGB triple).
 
     Raises
     ------
@@ -108,7 +108,7 @@ def read_layout(said: Any) -> Layout:
 
 
 def read_place(at: Any, number: int) -> complex:
-    """A place [m], u to the right and v down, from [y, z]."""
+    """Read a place [m], u to the right and v down, from [y, z]."""
     try:
         y, z = (float(x) for x in at)
         place = complex(y, -z)
@@ -179,13 +179,13 @@ def _check(layout: Layout) -> None:
 
 
 def same_colour(chroma: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which marks have one colour, (n, n)."""
+    """Return a mask (n, n) of the marks with equal colours."""
     unit = chroma / np.hypot(*chroma.T)[:, None]
     return np.asarray(unit @ unit.T > SAME)
 
 
 def laid(body: NDArray[np.complex128], seen: NDArray[np.complex128]) -> tuple[complex, complex]:
-    """The centre and the factor, size and turn, that lay a body's points upon points that were seen."""
+    """Fit the centre and the complex factor (size, turn) that map a body's points to observed points."""
     spread = body - body.mean()
     turn = complex(np.vdot(spread, seen - seen.mean()) / np.vdot(spread, spread).real)
     return complex(seen.mean() - turn * body.mean()), turn

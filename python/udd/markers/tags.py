@@ -33,7 +33,7 @@ class Tag:
 
 
 def is_tags(said: Any) -> bool:
-    """Whether a layout is one of tags."""
+    """Return True if a layout consists of tags."""
     if isinstance(said, str | Mapping) or not isinstance(said, Sequence):
         return False
     return any(isinstance(m, Tag) or (isinstance(m, Mapping) and "tag" in m) for m in said)
@@ -81,7 +81,7 @@ def dictionary(name: str) -> Any:
 
 
 def cells_of(tag: Tag) -> NDArray[np.uint8]:
-    """The black and white cells of a tag, 0 or 255, its border among them."""
+    """Return the black and white cells of a tag, 0 or 255, with its border."""
     import cv2
 
     words = dictionary(tag.dictionary)
@@ -89,6 +89,6 @@ def cells_of(tag: Tag) -> NDArray[np.uint8]:
 
 
 def layout_of(tags: Sequence[Tag]) -> Layout:
-    """The corners as the marks of a layout."""
+    """Return the corners as the marks of a layout."""
     corners = tuple(complex(c) for tag in tags for c in tag.corners)
     return Layout(corners, ((0, 200, 220),) * len(corners))

@@ -1,4 +1,4 @@
-"""Which column is what, guessed from headings in English, German and Dutch."""
+"""Guesses of the meaning of columns, from headings in English, German and Dutch."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _role(heading: Heading) -> str:
 
 
 def _liveliness(table: Table, k: int) -> float:
-    """How much a rate of turning varies; nothing if it has one sign, as a magnitude does."""
+    """Measure the variation of a rate of rotation; 0 if it has one sign, as a magnitude does."""
     try:
         values = table.numbers(k)
     except ValueError:

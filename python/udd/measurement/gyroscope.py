@@ -1,4 +1,4 @@
-"""Which column of a table is a gyroscope's: the rate at which a phone on a pendulum turns."""
+"""Gyroscope columns of a table: the rate of rotation of a phone on a pendulum."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ class InputSignal(Drawable):
 
     @cached_property
     def pieces(self) -> NDArray[np.float64]:
-        """As :meth:`coefficients`; each run and each step of a fit asks for them."""
+        """Return and keep :meth:`coefficients`; each run and each step of a fit uses them."""
         pieces = np.zeros((len(self.t) - 1, 4))
         pieces[:, 0] = self.values[:-1]
         if self.hold == "linear":
@@ -176,7 +176,7 @@ class InputSignal(Drawable):
 
     @checked_arguments(error=MeasurementError)
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Its values at times, of any shape; beyond its ends the value at the end."""
+        """Evaluate the signal at times of any shape; beyond its ends it keeps the value at the end."""
         at = np.clip(_numbers("t", t), *self.span)
         piece = np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, len(self.t) - 2)
         since = at - self.t[piece]
@@ -223,7 +223,7 @@ def input_signals(
 
 
 def _numbers(what: str, given: ArrayLike) -> NDArray[np.float64]:
-    """The numbers of an argument, of any shape."""
+    """Convert an argument to numbers, of any shape."""
     try:
         return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

@@ -142,14 +142,14 @@ def read_measurement(
 
 
 def tables_of(path: str | os.PathLike[str], *, limit: float = LARGEST) -> list[Table]:
-    """The tables that a file holds, before anything is made of their columns."""
+    """Read the tables in a file, before their columns are interpreted."""
     return _load(Path(path), None, limit)
 
 
 def headings_of(
     path: str | os.PathLike[str], columns: Columns | None = None, *, limit: float = LARGEST
 ) -> list[Heading]:
-    """The headings of a file's columns that have a name, with the units that they state."""
+    """Return the headings of a file's columns that have a name, with their units."""
     tables = _load(Path(path), _mapping(columns)[1], limit)
     return [heading for table in tables for heading in table.headings if heading.name]
 
@@ -157,7 +157,7 @@ def headings_of(
 def columns_of(
     path: str | os.PathLike[str], columns: Columns | None = None, *, limit: float = LARGEST
 ) -> list[str]:
-    """The names of a file's columns, read as by :func:`read_measurement`."""
+    """Return the names of a file's columns, read as by :func:`read_measurement`."""
     mapping = _mapping(columns)[0]
     names = [heading.name for heading in headings_of(path, columns, limit=limit)]
     return [*(mapping or {}), *(name for name in names if name not in (mapping or {}))]
@@ -179,7 +179,7 @@ def column_sentence(columns: Any) -> str:
 
 
 def _mapping(columns: Columns | None) -> tuple[dict[str, str | tuple[str, str]] | None, list[str] | None]:
-    """The columns by what they are, or else all their names in order."""
+    """Return the columns by their meaning, or else all their names in order."""
     if columns is None:
         return None, None
     if isinstance(columns, Mapping):
@@ -218,7 +218,7 @@ def pairs(text: str, what: str) -> dict[str, str]:
 
 
 def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str, str]:
-    """The inputs' columns by their names."""
+    """Return the columns of the inputs by name."""
     if inputs is None:
         return {}
     if isinstance(inputs, str):
@@ -301,7 +301,7 @@ def _measurement(
 
 
 def _names(record: Recorded, states: Sequence[str] | None) -> tuple[tuple[str, ...], bool]:
-    """The measurement's columns, and whether they are to be made of a bob's position."""
+    """Return the measurement's columns, and True if a bob's position determines them."""
     if states is not None:
         return tuple(states), False
     if record.mapping is not None:

@@ -1,4 +1,4 @@
-"""Which columns of a file make a measurement: found by name, cut to one run of the clock, in base units."""
+"""Columns of a file that make a measurement: found by name, cut to one run of the clock, in base units."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Asked = str | tuple[str, str]
 
 @dataclass(frozen=True)
 class Units:
-    """How the units in headings are used.
+    """Treatment of the units in headings.
 
     Attributes
     ----------
@@ -85,13 +85,13 @@ class Recorded:
         return asked if all(table.find(part) is not None for part in parts) else None
 
     def missing(self, asked: str) -> MeasurementError:
-        """The sentence about a column that is nowhere."""
+        """Return the sentence about a column that is in no table."""
         found = [raw for table in self.tables for raw in table.raw_headings]
         listed = ", ".join(found[:40]) + (f" and {len(found) - 40} more" if len(found) > 40 else "")
         return MeasurementError(f"no column {asked}: found {listed or 'nothing'}")
 
     def frames(self, names: Sequence[str], units: Units) -> Frames:
-        """The table in which the coordinates lie.
+        """Return the table that holds the coordinates.
 
         Raises
         ------
@@ -138,15 +138,15 @@ class Frames:
 
     @property
     def renamed(self) -> bool:
-        """Whether anything is called otherwise in the file."""
+        """Return True if a column has another name in the file."""
         return any(name != text for name, text in self.sources.items())
 
     def has(self, name: str) -> bool:
-        """Whether there is a column for it."""
+        """Return True if there is a column for it."""
         return self.record.find(self.table, name) is not None
 
     def times(self) -> NDArray[np.float64]:
-        """The times of the rows [s]."""
+        """Return the times of the rows [s]."""
         self._note("t", self.run.heading, self.run.conversion)
         self.kept += [self.table.cut] if self.table.cut else []
         return self.run.t
@@ -180,7 +180,7 @@ class Frames:
         return np.arctan2(x, -y)
 
     def words(self, name: str) -> NDArray[np.str_]:
-        """The column for `name` as text."""
+        """Return the column for `name` as text."""
         asked = self.record.find(self.table, name)
         k = self.table.find(asked) if isinstance(asked, str) else None
         if k is None:
@@ -262,7 +262,7 @@ def _run(record: Recorded, table: Table, units: Units) -> Run:
 
 
 def _rows(record: Recorded, t: NDArray[np.float64]) -> NDArray[np.int64] | None:
-    """The rows of the part between two jumps of the clock, of equal times the first; None for all."""
+    """Return the rows of the part between two jumps of the clock, of equal times the first; None for all."""
     if record.part is None and record.repeated is None:
         return None
     rows = np.arange(len(t))
@@ -279,7 +279,7 @@ def _rows(record: Recorded, t: NDArray[np.float64]) -> NDArray[np.int64] | None:
 
 
 def _framed(table: Table) -> Table:
-    """The table without the rows at its end that hold only an input with a clock of its own."""
+    """Drop the rows at the end of the table that hold only an input with its own clock."""
     if not any(heading.name.startswith("t:") for heading in table.headings):
         return table
     k = table.find("t")
@@ -290,7 +290,7 @@ def _framed(table: Table) -> Table:
 
 
 def _timed(table: Table, k: int) -> Table:
-    """The table without a last row that has no time, as a log has that was cut off."""
+    """Drop a last row without a time, as in a log that was cut off."""
     column = table.columns[k]
     if len(table) < 2 or not isinstance(column, TextColumn) or column.values is None:
         return table
@@ -301,7 +301,7 @@ def _timed(table: Table, k: int) -> Table:
 
 
 def own_inputs(table: Table) -> dict[str, InputSignal]:
-    """The inputs that a file of the package holds: ``input:NAME``, over ``t:NAME`` where that is there."""
+    """Return the inputs in a file of the package: ``input:NAME``, over ``t:NAME`` if that column exists."""
     holds = table.meta.get("input_hold")
     places = {heading.name: k for k, heading in enumerate(table.headings)}
     signals = {}

@@ -198,7 +198,7 @@ class Measurement(Drawable):
         return len(self.t)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A column by name (of `quality` too), a standard error as ``sigma_<name>``, or an input at `t`."""
+        """Return a column (or `quality`), a standard error as ``sigma_<name>``, or an input at `t`."""
         if name in self.inputs:
             return self.inputs[name](self.t)
         if name in self.quality and name not in self.names:
@@ -390,19 +390,19 @@ class Measurement(Drawable):
 
 
 def usable(flag: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Whether each flag is empty, or says something of a row that counts all the same."""
+    """Return a mask of flags that are empty, or only a remark on a row that counts."""
     return np.asarray([not said or said.startswith(USABLE) for said in flag.tolist()], dtype=bool)
 
 
 def _names(given: Any) -> tuple[str, ...]:
-    """The names of the columns, as a tuple."""
+    """Return the names of the columns, as a tuple."""
     if not isinstance(given, (tuple, list)) or not all(isinstance(name, str) for name in given):
         raise MeasurementError(f"names must be a list of the columns' names, not {given!r:.80}")
     return tuple(given)
 
 
 def _numbers(what: str, given: ArrayLike) -> NDArray[np.float64]:
-    """A copy as numbers."""
+    """Copy an argument as numbers."""
     try:
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError):

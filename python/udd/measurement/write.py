@@ -63,7 +63,7 @@ def to_parquet(m: Measurement, path: str | os.PathLike[str]) -> None:
 
 
 def numbers(m: Measurement) -> dict[str, NDArray[Any]]:
-    """The numeric columns of the file, by name and in order."""
+    """Return the numeric columns of the file, by name and in order."""
     table = {"t": m.t} | {name: m.values[:, k] for k, name in enumerate(m.names)}
     if m.sigma is not None:
         table |= {f"sigma_{name}": m.sigma[:, k] for k, name in enumerate(m.names)}
@@ -74,7 +74,7 @@ def numbers(m: Measurement) -> dict[str, NDArray[Any]]:
 
 
 def inputs(m: Measurement) -> dict[str, NDArray[np.float64]]:
-    """The inputs' columns, each before it the times of its own where it has them."""
+    """Return the columns of the inputs; an input's own times come before it."""
     columns = {}
     for name, signal in m.inputs.items():
         if not m.on_rows(name):
@@ -90,7 +90,7 @@ def header(m: Measurement) -> dict[str, Any]:
 
 
 def _text(key: str, value: Any) -> str:
-    """A value of `meta` on one line, such that reading gives it back."""
+    """Write a value of `meta` on one line, so that reading restores it."""
     if any(c in key for c in "=\n\r#"):
         raise MeasurementError(
             f"the header key {key!r} holds a character that the file format does not allow"

@@ -680,7 +680,7 @@ def _delays(
     parameters: Mapping[str, float],
     delays: Mapping[str, str] | None,
 ) -> tuple[tuple[str, str], ...]:
-    """The inputs and sensors that are late, each with its parameter."""
+    """Return the delayed inputs and sensors, each with its parameter."""
     if not isinstance(delays, Mapping | None):
         raise ModelError(f"delays must be a table of inputs or sensors and parameters, not {delays!r}")
     for name, parameter in (delays or {}).items():
@@ -725,7 +725,7 @@ def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
 def _equations(
     names: tuple[str, ...], equations: Mapping[str, Expression] | Sequence[Expression]
 ) -> tuple[str, ...]:
-    """The rates in the order of the states."""
+    """Return the rates in the order of the states."""
     if isinstance(equations, Mapping):
         given = {str(name): equation for name, equation in equations.items()}
         for name in names:

@@ -60,7 +60,7 @@ class ParameterBatch:
 def parameter_batch(
     model: Model, parameters: Mapping[str, ArrayLike], states: tuple[int, ...] = ()
 ) -> ParameterBatch:
-    """The checked parameters of orbits; `states` are the leading axes of their initial states."""
+    """Check the parameters of orbits; `states` are the leading axes of their initial states."""
     values = {name: array(name, value) for name, value in parameters.items()}
     try:
         shape = np.broadcast_shapes(states, *(value.shape for value in values.values()))
@@ -76,7 +76,7 @@ def parameter_batch(
 def orbits_of(
     model: Model, parameters: Mapping[str, ArrayLike], state0: ArrayLike | None
 ) -> tuple[tuple[int, ...], Floats, Floats]:
-    """The leading axes, the parameters of each orbit (or of all), and its start (or that of all)."""
+    """Return the leading axes, the parameters of each orbit (or of all), and its start (or that of all)."""
     states = array("state0", default_state(model) if state0 is None else state0)
     names = model.state_names
     if states.ndim == 0 or states.shape[-1] != len(names):

@@ -32,7 +32,7 @@ class Powers(NamedTuple):
 
 @dataclass(frozen=True)
 class DynamicsProfile:
-    """How the motion of a model is followed and compared: chaos, attractors, bifurcations, sweeps.
+    """Numbers for following and comparing the motion of a model: chaos, attractors, bifurcations, sweeps.
 
     Attributes
     ----------
@@ -254,7 +254,7 @@ class Coordinate(OneLine):
 
 
 class CurveSlot(NamedTuple):
-    """Where an unknown curve may enter: an effect's slot, its momentum, and the state in whose equation."""
+    """Place of an unknown curve: an effect's slot, its momentum, and the state in whose equation."""
 
     name: str
     momentum: str | None

@@ -157,7 +157,7 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def _said(result: xr.Dataset, title: str) -> str:
-    """An ending in words; an attractor with what it is."""
+    """Describe an ending in words; an attractor with its kind."""
     if not title.startswith("attractor"):
         return title
     one = result.sel(number=int(title.split()[1]))
@@ -166,7 +166,7 @@ def _said(result: xr.Dataset, title: str) -> str:
 
 
 def _ends(result: xr.Dataset, titles: list[str]) -> xr.DataArray:
-    """The place of each initial state's ending among the titles."""
+    """Return the place of each initial state's ending among the titles."""
     ends: xr.DataArray = result["attractor"] - 1
     for value, name in enumerate(str(result["outcome"].attrs["flag_meanings"]).split()):
         title = name.replace("_", " ")
@@ -176,7 +176,7 @@ def _ends(result: xr.Dataset, titles: list[str]) -> xr.DataArray:
 
 
 def shown_component(result: xr.Dataset, component: str | None) -> str:
-    """The component that is drawn: the one asked for, or the first that varies."""
+    """Return the component to draw: the given one, or the first that varies."""
     components = [str(name) for name, array in result.data_vars.items() if "point" in array.dims]
     if component is not None:
         if component not in components:
@@ -191,7 +191,7 @@ def shown_component(result: xr.Dataset, component: str | None) -> str:
 
 
 def _axis(result: xr.Dataset, name: str) -> tuple[str, str, float]:
-    """The words, the unit and the factor of a component."""
+    """Return the words, the unit and the factor of a component."""
     return AXES.get(name, (name, result[name].attrs.get("units", "1"), 1.0))
 
 

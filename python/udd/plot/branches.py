@@ -167,7 +167,7 @@ def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = 
 
 
 def _curves(branch: Branch, name: str, view: str, section: str | None) -> Rows:
-    """For each place on the branch the values that are drawn there, of the mirror image too."""
+    """Return the drawn values for each place on the branch, with those of the mirror image."""
     column, factor = branch.model.state_names.index(name), axis_of(branch.model, name)[1]
     if view == "period":
         return [[np.array([period])] for period in branch.periods]
@@ -182,7 +182,7 @@ def _curves(branch: Branch, name: str, view: str, section: str | None) -> Rows:
 
 
 def _mirrored(branch: Branch, column: int) -> float:
-    """The sign of a component in the mirror image that is drawn too, 0 where there is none."""
+    """Return the sign of a component in the mirror image that is drawn too, 0 without such an image."""
     flow = branch._places[0][0].flow
     if flow.mirror is None or branch.symmetric or column not in flow.kept:
         return 0.0

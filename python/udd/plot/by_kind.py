@@ -1,4 +1,4 @@
-"""Which function draws which kind of result."""
+"""Table of the function that draws each kind of result."""
 
 from __future__ import annotations
 

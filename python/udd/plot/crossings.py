@@ -159,7 +159,7 @@ def _components(result: Section) -> tuple[str, str]:
 
 
 def _axis(result: Section, name: str) -> tuple[str, NDArray[np.float64]]:
-    """The label of an axis, and the numbers along it."""
+    """Return the label of an axis, and the numbers along it."""
     if name == "t":
         return label("t" if result.model.profile.dynamics.time_unit else "tau"), result.t
     said, factor = axis_of(result.model, name)

@@ -106,7 +106,7 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
 
 
 def _axis(name: str) -> tuple[str, float]:
-    """The label of a coordinate's axis, and by what its SI value is multiplied."""
+    """Return the label of a coordinate's axis, and the factor of its SI value."""
     words, unit, across = _COORDINATES.get(name, (name, "", 1.0))
     return f"{words} [{unit}]" if unit else words, across
 
@@ -118,7 +118,7 @@ def _value(curve: Any) -> tuple[str, float]:
 
 
 def _range(curve: Any, k: int, number: int) -> tuple[Array, Array]:
-    """Where the record was along a coordinate, and evenly spaced places over that."""
+    """Return the places of the record along a coordinate, and evenly spaced places over their range."""
     places = np.mod(curve.places[k], 2 * np.pi) if curve.splines[k].periodic else curve.places[k]
     low, high = np.quantile(places, (0.002, 0.998))
     return places, np.linspace(low, high, number)

@@ -112,7 +112,7 @@ def decreases(discovery: Any, stage: int) -> dict[str, float]:
 
 
 def threshold(discovery: Any, stage: int) -> float:
-    """The chi2 that a candidate with one amplitude must reach, all candidates counted."""
+    """Return the chi2 that a candidate with one amplitude must reach, with all candidates counted."""
     from udd._util import chi_squared
     from udd.discovery.thresholds import ALPHA
 

@@ -96,7 +96,7 @@ def exponents(
 
 
 def _of_sweep(result: Any) -> tuple[str, Array, Array, Array, str]:
-    """The axis, the values, the exponents, their errors and their unit."""
+    """Return the axis, the values, the exponents, their errors and their unit."""
     if not {"value", "standard_error"} <= set(result.data_vars):
         raise UddError('the dataset holds no exponents: udd.sweep computes "lyapunov" and "spectrum"')
     over = [str(name) for name in result["value"].dims if name != "number"]
@@ -110,7 +110,7 @@ def _of_sweep(result: Any) -> tuple[str, Array, Array, Array, str]:
 
 
 def _of_spectra(result: Any) -> tuple[str, Array, Array, Array, str]:
-    """The same of several spectra."""
+    """Return the axis, values, exponents, errors and unit of several spectra."""
     given = list(result) if isinstance(result, Sequence) else [result]
     if not given or not all(isinstance(spectrum, Spectrum) for spectrum in given):
         raise UddError("exponents need values and exponents, spectra of udd.lyapunov_spectrum, or a sweep")

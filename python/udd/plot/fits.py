@@ -183,7 +183,7 @@ def coordinates(fit: Any) -> dict[str, Array]:
 
 
 def clearest(fit: Any, equation: str | None = None, against: str | None = None) -> tuple[str, str]:
-    """The equation and the coordinate between which the residual shows the clearest pattern."""
+    """Return the equation and the coordinate for which the residual has the clearest pattern."""
     names = fit.model.state_names
     best, panel = -1.0, (names[0], "t")
     for name in [equation] if equation else names:
@@ -237,7 +237,7 @@ def binned(x: Array, y: Array, bins: int = _BINS) -> tuple[Array, Array, Array]:
 
 
 def _remembered(y: Array) -> int:
-    """A stretch of frames three times as long as `y` remembers."""
+    """Return a number of frames three times as long as the correlation of `y`."""
     x = np.nan_to_num(y - np.nanmean(y))
     power = float(x @ x)
     for lag in range(1, min(len(x) // 4, 400)):

@@ -87,7 +87,7 @@ def geometry(
 
 
 def _centre_and_mark(state: ArrayLike | None, radius: float) -> tuple[NDArray[np.float64], float]:
-    """The centre [cm] and beta."""
+    """Return the centre [cm] and beta."""
     if state is None:
         return _DISTANCE * radius * _towards(_THETA), _THETA + _PHI
     values = array("state", state)
@@ -97,7 +97,7 @@ def _centre_and_mark(state: ArrayLike | None, radius: float) -> tuple[NDArray[np
 
 
 def _towards(angle: Any) -> NDArray[np.float64]:
-    """The unit vector at an angle clockwise from upright; the coordinates along the last axis."""
+    """Return the unit vector at an angle clockwise from upright; the coordinates are along the last axis."""
     return np.stack([np.sin(angle), np.cos(angle)], axis=-1)
 
 

@@ -61,7 +61,7 @@ class Motion:
 
     @property
     def is_own(self) -> bool:
-        """Whether the columns are states or sensors of the user's own model."""
+        """Return True if the columns are states or sensors of the user's own model."""
         written = isinstance(self.model, Model) and self.model.profile.written
         return written or not self._drawn
 
@@ -79,7 +79,7 @@ class Motion:
         return tuple(self.columns)[:2] if self.is_own else self.profile.shown.path
 
     def axis(self, name: str) -> tuple[str, str, float]:
-        """The words, the unit and the factor of a column."""
+        """Return the words, the unit and the factor of a column."""
         if not self.is_own:
             return AXES[name]
         model = self.model
@@ -125,7 +125,7 @@ def require_fit(result: Any) -> None:
 
 
 def is_fit(result: Any) -> bool:
-    """Whether a result is a fit of a model to a measurement."""
+    """Return True if a result is a fit of a model to a measurement."""
     return all(hasattr(result, name) for name in _OF_A_FIT)
 
 
@@ -151,7 +151,7 @@ def first_film(fit: Any) -> Any:
 
 
 def motions(result: Any) -> list[Motion]:
-    """The motions that a trajectory, a measurement or a fit (measured, then fitted; of the first film) holds.
+    """Return the motions in a trajectory, a measurement or a fit (measured, then fitted; the first film).
 
     Raises
     ------
@@ -188,7 +188,7 @@ def measured(measurement: Any, model: Any) -> Motion:
 
 
 def fitted(fit: Any) -> Motion:
-    """The fitted states; a coordinate that was measured is given as the camera should have seen it.
+    """Return the fitted states; a measured coordinate is given as the camera should have seen it.
 
     So that it lies on the measured one where the fit is good, in spite of the camera's offset and tilt.
     """
@@ -199,7 +199,7 @@ def fitted(fit: Any) -> Motion:
 
 
 def only(result: Any) -> Motion:
-    """The one motion with all states: a trajectory's, or the fitted one."""
+    """Return the one motion with all states: a trajectory's, or the fitted one."""
     return motions(result)[-1]
 
 

@@ -150,7 +150,7 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
 
 
 def _device(ax: Axes, drawn: Sequence[Motion]) -> None:
-    """The contact in the middle, and the circle on which the disk would leave the wheels."""
+    """Draw the contact in the middle, and the circle at which the disk loses contact."""
     from matplotlib.patches import Circle
 
     ax.plot(0, 0, "+", color="black", markersize=9, markeredgewidth=1.5)

@@ -105,7 +105,7 @@ def _cells(fit: Any) -> list[list[tuple[Array, Array, Array]]]:
 
 
 def beyond_chance(cell: tuple[Array, Array, Array], cells: int) -> bool:
-    """Whether the means of a cell scatter more about zero than chance allows, all cells counted."""
+    """Return True if the means of a cell scatter more about zero than chance allows, all cells counted."""
     from udd._util import chi_squared
 
     _, mean, error = cell

@@ -1,4 +1,4 @@
-"""How all pictures look: colours, names of axes, and where new Axes come from."""
+"""Style of all pictures: colours, names of axes, and new Axes."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ def label(name: str) -> str:
 
 
 def scale(name: str) -> float:
-    """By what a coordinate's SI value is multiplied on its axis."""
+    """Return the factor of a coordinate's SI value on its axis."""
     return AXES[name][2]
 
 
 def axis_of(model: Any, name: str) -> tuple[str, float]:
-    """The label of a component of a model's state, and by what it is multiplied."""
+    """Return the label of a component of a model's state, and its factor."""
     if name in AXES:
         return label(name), scale(name)
     units = dict(zip(model.state_names, model.state_units, strict=True))
@@ -83,7 +83,7 @@ WIDE, SQUARE = (6.4, 4.4), (5.6, 5.2)
 
 
 def new_axes(ax: Axes | None = None, projection: str | None = None, size: tuple[float, float] = WIDE) -> Axes:
-    """The Axes given, or those of a new figure of this size."""
+    """Return the given Axes, or those of a new figure of this size."""
     if ax is not None:
         return ax
     import matplotlib.pyplot as plt

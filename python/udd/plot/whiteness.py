@@ -1,4 +1,4 @@
-"""Whether what a model leaves unforeseen is white noise."""
+"""Picture of the test for white innovations."""
 
 from __future__ import annotations
 
@@ -76,5 +76,5 @@ def whiteness(
 
 
 def shown_lags(innovations: Any) -> int:
-    """How many lags are looked at."""
+    """Return the number of lags that are shown."""
     return int(min(max(25, round(_SHOWN / innovations.dt)), len(innovations.values) // 4))

@@ -75,7 +75,7 @@ def _with_gaps_filled(seen: Array) -> Array:
 
 
 def _within(seen: Array, radius: float) -> Array:
-    """A disk that has left the wheels stays where it left them."""
+    """Cut the motion where the disk loses contact, so that it stays there."""
     gone = ~(np.hypot(seen[:, 0], seen[:, 1]) < 1.05 * radius)
     return seen[: int(np.argmax(gone))] if gone.any() and not gone[0] else seen
 
@@ -165,7 +165,7 @@ def _padded(seen: Array, frames: int) -> Array:
 
 
 def _mp4(panels: list[Panel], t: Array, measurement: Measurement, film: Path) -> bytes:
-    """The film's own frames beside drawn disks, at the scale of the film."""
+    """Make the film's frames next to drawn disks, at the scale of the film."""
     from udd.video.writer import require_video, write_film
 
     require_video()
@@ -199,7 +199,7 @@ def _composed(
 
 
 def _drawn(panel: Panel, radius: float, frames: int) -> Iterator[NDArray[np.uint8]]:
-    """A disk as a drawing, frame by frame."""
+    """Draw a disk, frame by frame."""
     import cv2
 
     unit, fine = _PANEL / 2 / _REACH, 16  # OpenCV takes fractions of a pixel as whole numbers

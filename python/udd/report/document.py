@@ -153,7 +153,7 @@ class Table(OneLine):
     marked: frozenset[int] = frozenset()
 
     def plain(self) -> list[list[str]]:
-        """Its cells without HTML, the headings first."""
+        """Return the cells without HTML, the headings first."""
         return [[plain(c.title) for c in self.columns], *([plain(cell) for cell in row] for row in self.rows)]
 
 
@@ -239,7 +239,7 @@ class Report:
         return f"{verdict}; {parts}"
 
     def parts(self) -> Iterator[Part]:
-        """All parts in their order, those of galleries too."""
+        """Yield all parts in their order, those of galleries too."""
         for section in self.sections:
             for part in section.parts:
                 yield from part.figures if isinstance(part, Gallery) else (part,)
@@ -258,13 +258,13 @@ class Report:
 def table(
     title: str, columns: Mapping[str, Column], rows: Iterable[Mapping[str, Text]], caption: Text = ""
 ) -> Table:
-    """A table of these columns from rows by name."""
+    """Make a table of these columns from rows by name."""
     cells = tuple(tuple(row[name] for name in columns) for row in rows)
     return Table(title, tuple(columns.values()), cells, caption)
 
 
 def parts(*given: Part | Sequence[Part] | None) -> tuple[Part, ...]:
-    """Those that there are, one after the other."""
+    """Return the parts that are not None, in order."""
     result: list[Part] = []
     for one in given:
         if one is not None:

@@ -30,7 +30,7 @@ _FRAMES = 4  # of the film
 
 
 def orbits(discovery: Discovery) -> Image:
-    """The orbit as measured, and as the models run."""
+    """Draw the measured orbit, and runs of the models."""
     runs_shown = [("the known model alone", discovery.baseline, BEFORE)]
     if discovery.effects:
         runs_shown.append(("with the added effect", discovery.fit, AFTER))
@@ -65,7 +65,7 @@ def orbits(discovery: Discovery) -> Image:
 
 
 def forecast(discovery: Discovery) -> Image:
-    """The first seconds of the held-out data, and what the models make of them."""
+    """Draw the first seconds of the held-out data, and the models' predictions."""
     prediction = runs.forecast(discovery)
     name = discovery.fit.model.profile.shown.columns[-1]
     k = discovery.measurement.names.index(name)
@@ -111,7 +111,7 @@ def residual_map(loose: Sequence[Fit]) -> Image:
 
 
 def residuals(loose: Sequence[Fit]) -> Image:
-    """The clearest of these patterns frame by frame, before and after."""
+    """Draw the clearest of these patterns frame by frame, before and after."""
     columns = list(zip(("the known model", "with the added effect"), loose, (BEFORE, AFTER), strict=False))
     equation, against = fits.clearest(loose[0])
     figure, grid = blank(4.6 * len(columns) + (0 if len(columns) > 1 else 1.5), 2.9, columns=len(columns))
@@ -132,14 +132,14 @@ def residuals(loose: Sequence[Fit]) -> Image:
 
 
 def curve(found: Curve) -> Image:
-    """A curve that was located without a formula."""
+    """Draw a curve that was located without a formula."""
     figure, ((ax,),) = blank(6.4, 3.4, top=0.45)
     plot.curve(found, ax)
     return svg(figure, f"{found.title}, with its band")
 
 
 def evidence(discovery: Discovery, stage: int) -> Image:
-    """The evidence for each candidate at one stage of the search."""
+    """Draw the evidence for each candidate at one stage of the search."""
     scan = [s for s in discovery.scans[stage] if not s.absorbed][:12]
     longest = max((len(s.candidate.title) for s in scan), default=10)
     figure, ((ax,),) = blank(9.0, 1.2 + 0.28 * len(scan), left=0.4 + 0.072 * longest, top=0.55)
@@ -174,7 +174,7 @@ def whiteness(innovations: Sequence[Innovations]) -> Image:
 
 
 def friction(fit: Fit) -> Image:
-    """The friction that was found."""
+    """Draw the estimated friction."""
     figure, ((ax,),) = blank(6.4, 3.2)
     plot.friction(fit, ax)
     return svg(
@@ -224,7 +224,7 @@ def _look_at(geometry: Pixels, shape: tuple[int, ...], ax: Axes) -> None:
 
 
 def _fitted(fit: Fit) -> Measurement:
-    """The measurement as the fit says it should have been, where it was seen."""
+    """Return the fitted measurement of the observed frames."""
     measurement = fit.measurement
     rest = np.where(np.isfinite(fit.residuals), fit.residuals, 0.0)
     return Measurement(

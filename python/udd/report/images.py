@@ -29,7 +29,7 @@ def blank(
     between: float = 0.25,
     shared: bool = False,
 ) -> tuple[Figure, list[list[Axes]]]:
-    """A figure and its Axes, row by row, with margins in inches: a layout engine takes half of the time."""
+    """Make a figure and its Axes by rows, with margins in inches; layout engines need twice the time."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height))

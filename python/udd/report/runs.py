@@ -46,7 +46,7 @@ class Forecast:
 
 
 def free_run(fit: Fit) -> Trajectory | None:
-    """The fitted model from the first fitted state on, for as long as the record; None where it diverges."""
+    """Run the fitted model from the first fitted state over the record; None if it diverges."""
     t = fit.record.t
     times = np.arange(t[0], t[-1], _STEP)
     try:
@@ -56,7 +56,7 @@ def free_run(fit: Fit) -> Trajectory | None:
 
 
 def smooth(fit: Fit) -> SimpleNamespace:
-    """The fitted states with a curve through them, whose slopes are the model's."""
+    """Return a curve through the fitted states, with the slopes of the model."""
     t = fit.record.t
     curve = CubicHermiteSpline(t, fit.states, fit.model.rates(t, fit.states))
     fine = np.unique(np.concatenate([t, np.arange(t[0], t[-1], _STEP)]))
@@ -67,7 +67,7 @@ def smooth(fit: Fit) -> SimpleNamespace:
 
 
 def forecast(discovery: Discovery) -> Forecast:
-    """From the first held-out frame on: a disk's first seconds, a pendulum's last ones of the whole run."""
+    """Predict from the first held-out frame: a disk's first seconds, a pendulum's last ones."""
     fit, m = discovery.fit, discovery.measurement
     t = fit.record.t
     origin = fit.record.origin

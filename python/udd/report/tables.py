@@ -38,18 +38,18 @@ def camera(discovery: Discovery) -> list[dict[str, str]]:
 
 
 def _base(name: str) -> str:
-    """A parameter's name without the number of the film that it belongs to."""
+    """Return a parameter's name without the number of its film."""
     return name.partition("[")[0]
 
 
 def _of_film(name: str) -> str:
-    """Which film it belongs to, where there are several."""
+    """Return the film of a parameter in brackets; empty if there is only one."""
     film = name.partition("[")[2].rstrip("]")
     return f" (film {int(film) + 1})" if film else ""
 
 
 def _knots(discovery: Discovery) -> set[str]:
-    """The parameters of curves, which a picture shows better."""
+    """Return the parameters of curves, which a picture shows better."""
     curves = [e for e in discovery.fit.model.effects if wording.is_spline(e)]
     return {f"{e.name}.{p}" for e in curves for p in e.parameters}
 
@@ -87,7 +87,7 @@ def _rows(
 
 
 def fixed(discovery: Discovery) -> list[dict[str, str]]:
-    """The model's parameters that were taken as known: name, meaning, value, unit."""
+    """List the fixed parameters of the model: name, meaning, value, unit."""
     model = discovery.fit.model
     rows = []
     for name, value in model.parameters.items():

@@ -55,7 +55,7 @@ def write_tracked(
     *,
     command: str | None = None,
 ) -> None:
-    """As `udd.tracking.page`."""
+    """Write the page of :func:`udd.tracking.page`."""
     from udd.tracking.metric.rolling_check import health
     from udd.tracking.pipeline import Tracking
 
@@ -194,7 +194,7 @@ def numbers(m: Measurement, checked: Health | None) -> tuple[Number, ...]:
 
 
 def calibration(m: Measurement) -> list[dict[str, Text]]:
-    """The self-calibration: item, value, standard error, how."""
+    """List the self-calibration: item, value, standard error, method."""
     rows: list[dict[str, Text]] = []
     for name, (value, sigma, how) in m.meta["calibration"].items():
         factor, unit = (1.0, "px") if name == "length" else unit_of(name)
@@ -218,7 +218,7 @@ def calibration(m: Measurement) -> list[dict[str, Text]]:
 
 
 def _digits(value: float, sigma: float | None) -> str:
-    """As many places as the standard error has in two digits."""
+    """Round to as many decimals as two digits of the standard error have."""
     if not sigma or not math.isfinite(sigma):
         return f"{value:.6g}"
     places = min(max(0, 1 - math.floor(math.log10(sigma))), 7)
@@ -319,7 +319,7 @@ def quality(m: Measurement) -> Image:
 
 
 def picture_map(m: Measurement, detail: Tracking | None) -> Image:
-    """How far marks are off, over the picture; without the detail the frame's mean where the disk was."""
+    """Draw the errors of the marks over the picture; without their detail the frame's mean at the disk."""
     from udd.tracking import pixels
 
     where = pixels(m)

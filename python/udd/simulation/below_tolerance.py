@@ -26,7 +26,7 @@ _FEW = 200  # a run with fewer states is looked at again
 
 
 def growing_components(model: Model, size: _Floats, t: float = 0.0) -> NDArray[np.intp]:
-    """The components whose rates are proportional to them, as that of a population is.
+    """Return the components whose rates are proportional to them, as that of a population is.
 
     Only these grow again from below `atol` as from any other size. `size` (dim,) is how large they are.
     """
@@ -126,7 +126,7 @@ def warn_along(model: Model, times: _Floats, states: _Floats, rtol: float, atol:
 
 
 def _states(model: Model, times: _Floats, start: _Floats, rtol: float, atol: float) -> _core._Run:
-    """A run by the method that sections and exponents use."""
+    """Return states of a run by the method that sections and exponents use."""
     method = "taylor" if _core.has_series(model) else "dop853"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StiffnessWarning)
@@ -134,7 +134,7 @@ def _states(model: Model, times: _Floats, start: _Floats, rtol: float, atol: flo
 
 
 def _matters(model: Model, k: int, times: _Floats, state: _Floats, rtol: float, atol: float) -> bool:
-    """Whether an error of `atol` in component `k` changes it where it has grown again."""
+    """Return True if an error of `atol` in component `k` changes it after it has grown again."""
     fine = 1e-6 * float(np.abs(state[k]))
     moved = state.copy()
     moved[k] += math.copysign(atol, state[k])

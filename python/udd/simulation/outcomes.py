@@ -1,4 +1,4 @@
-"""How runs end, one list for all."""
+"""Outcomes of runs, in one list for all."""
 
 from __future__ import annotations
 

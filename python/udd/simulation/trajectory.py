@@ -78,7 +78,7 @@ class Events:
         return (self[index] for index in range(len(self)))
 
     def of(self, kind: str) -> Events:
-        """The events of one kind."""
+        """Return the events of one kind."""
         chosen = np.array([own == kind for own in self.kind], dtype=bool)
         return Events(tuple(own for own in self.kind if own == kind), self.t[chosen], self.state[chosen])
 
@@ -162,7 +162,7 @@ class Trajectory(Drawable):
         return of_states(model.state_names, model.state_units, self.state, ["t"], {"t": self.t}, **attrs)
 
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The state at any times within the run, as accurate as the method's dense output.
+        """Evaluate the state at any times within the run, as accurately as the method's dense output.
 
         Parameters
         ----------
@@ -209,7 +209,7 @@ METHODS = ("auto", "dopri5", "dop853", "taylor", "rodas")
 
 
 def method_for(model: Model, method: str, rtol: float) -> str:
-    """The method that is meant: for ``"auto"`` the faster one at equal error, as measured.
+    """Return the meant method: for ``"auto"`` the faster one at equal error, as measured.
 
     The choice follows the table that `benches/python/methods.py` prints: the series wins for every law that
     has one; the core hands runs over to others where it does not serve. Friction with modes is left to
@@ -264,7 +264,7 @@ def checked_times(t: ArrayLike) -> NDArray[np.float64] | float:
 
 
 def initial_state(model: Model, state0: ArrayLike) -> NDArray[np.float64]:
-    """A checked initial state."""
+    """Check an initial state."""
     require_model(model)
     state = array("state0", state0)
     if state.shape != (len(model.state_names),):
@@ -402,7 +402,7 @@ def integrated(
     dense: bool = False,
     inputs: Mapping[str, InputSignal | ArrayLike] | None = None,
 ) -> Trajectory:
-    """The same for who looks at the outcome: a run that leaves the disk is not warned of."""
+    """Run a model without a warning if the disk loses contact; the caller reads the outcome."""
     state = initial_state(model, state0)
     rtol, atol = tolerances(rtol, atol)
     times = checked_times(t)

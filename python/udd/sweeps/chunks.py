@@ -1,4 +1,4 @@
-"""How a sweep is cut into chunks, and the work on one of them."""
+"""Chunks of a sweep, and the work on a chunk."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ class Grid:
         return prod(self.counts)
 
     def place(self, chunk: int) -> tuple[int, ...]:
-        """Where among the chunks this one is."""
+        """Return the place of this chunk among the chunks."""
         return tuple(int(k) for k in np.unravel_index(chunk, self.counts))
 
     def region(self, chunk: int) -> tuple[slice, ...]:
-        """The chunk's values along each axis."""
+        """Return the chunk's values along each axis."""
         spans = zip(self.place(chunk), self.box, self.shape, strict=True)
         return tuple(slice(k * size, min((k + 1) * size, n)) for k, size, n in spans)
 
 
 def grid_of(spec: SweepSpec) -> Grid:
-    """The chunks of a sweep: filled up from the last axis on, and nearly equal along each."""
+    """Return the chunks of a sweep: filled up from the last axis on, and nearly equal along each."""
     room, box = spec.chunk, []
     for n in reversed(spec.shape):
         pieces = ceil(n / min(n, room))
@@ -61,14 +61,14 @@ class Part:
 
 
 def part_of(spec: SweepSpec, grid: Grid, chunk: int) -> Part:
-    """The part of a sweep that is a chunk."""
+    """Return the part of a sweep that is a chunk."""
     spans = zip(spec.axes.items(), grid.region(chunk), strict=True)
     axes = {name: values[span].copy() for (name, values), span in spans}
     return Part(spec.quantity, spec.model, axes, np.asarray(spec.state0), dict(spec.options))
 
 
 def compute(part: Part, threads: int) -> Found:
-    """The work on a chunk: a pure function of its part of the spec, whatever the number of threads."""
+    """Compute a chunk: a pure function of its part of the spec, whatever the number of threads."""
     mesh = np.meshgrid(*part.axes.values(), indexing="ij")
     shape = mesh[0].shape
     model = part.model
@@ -85,7 +85,7 @@ def compute(part: Part, threads: int) -> Found:
 
 
 def variables_of(spec: SweepSpec) -> tuple[Variable, ...]:
-    """The arrays of a sweep's result."""
+    """Return the arrays of a sweep's result."""
     outcome = Variable("outcome", "1", "how the trajectory ended", "int8")
     return (*QUANTITIES[spec.quantity].variables(spec.model), outcome)
 
@@ -100,14 +100,14 @@ def attributes(variable: Variable) -> dict[str, object]:
 
 
 def coordinate_attributes(spec: SweepSpec, name: str) -> dict[str, object]:
-    """The unit of an axis."""
+    """Return the attributes of an axis, with its unit."""
     units = dict(zip(spec.model.state_names, spec.model.state_units, strict=True)) | spec.model.units
     kind = "parameter" if name in spec.model.parameters else "initial value"
     return {"long_name": f"{kind} {name}", "units": units[name] or "1"}
 
 
 def spec_attributes(spec: SweepSpec) -> dict[str, object]:
-    """The spec and its hash."""
+    """Return the attributes with the spec and its hash."""
     return {"quantity": spec.quantity, "spec": spec.to_json(), "spec_sha256": spec.sha256}
 
 

@@ -100,7 +100,7 @@ def _next(landed: queue.SimpleQueue[Future[Any]]) -> Future[Any]:
 
 
 def _died(error: BaseException) -> bool:
-    """Whether it was the worker, or its machine, rather than the work."""
+    """Return True if the worker or its machine failed, and not the work."""
     kinds = (BrokenExecutor, CancelledError, OSError, MemoryError, KeyboardInterrupt, SystemExit)
     # Dask's KilledWorker and the like, without importing Dask.
     return isinstance(error, kinds) or type(error).__module__.partition(".")[0] == "distributed"

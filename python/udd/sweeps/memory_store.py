@@ -52,7 +52,7 @@ class Memory:
         return contextlib.nullcontext()
 
     def arguments(self, chunk: int) -> tuple[Any, ...]:
-        """What `work` takes."""
+        """Return the arguments of `work`."""
         return part_of(self._spec, self._grid, chunk), self._threads
 
     def keep(self, chunk: int, found: Found) -> None:
@@ -62,14 +62,14 @@ class Memory:
         self._done[chunk] = True
 
     def done(self) -> NDArray[np.bool_]:
-        """Which chunks are finished."""
+        """Return the mask of finished chunks."""
         return self._done
 
     def tidy(self) -> None:
         """Do nothing: memory needs no cleaning."""
 
     def dataset(self) -> xr.Dataset:
-        """What is there."""
+        """Return the dataset of the finished chunks."""
         import xarray as xr
 
         spec = self._spec

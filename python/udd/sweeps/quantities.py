@@ -175,7 +175,7 @@ def _ended(model: Model, rows: Floats, states: Floats, options: Options, threads
 
 
 def _ended_one_by_one(model: Model, rows: Floats, states: Floats, times: Floats, options: Options) -> Found:
-    """For friction by bristles, which ensembles do not have."""
+    """Run the models with bristle friction one by one, because ensembles do not have them."""
     limits: dict[str, Any] = {name: options.get(name) for name in ("rtol", "atol", "max_step")}
     t_end, ends = np.full(len(states), np.nan), np.full(states.shape, np.nan)
     outcome = np.full(len(states), FAILED, dtype=np.int8)

@@ -237,7 +237,7 @@ class SweepSpec:
 
 
 def _axis(model: Model, name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """The checked values of an axis, as an array of its own that stays as it is."""
+    """Return the checked values of an axis, as an immutable copy."""
     if name not in (*model.parameters, *model.state_names):
         known = ", ".join((*model.parameters, *model.state_names))
         raise ModelError(f"nothing of this model is called {name!r}; there are {known}")

@@ -36,7 +36,7 @@ _HASH = "spec_sha256"
 
 @dataclass(frozen=True)
 class Target:
-    """Where a chunk is written; travels to whoever does the work."""
+    """Destination of a chunk; it travels to the worker."""
 
     arrays: dict[str, zarr.Array[Any]]
     done: zarr.Array[Any]
@@ -45,7 +45,7 @@ class Target:
 
 
 def compute_and_write(part: Part, threads: int, target: Target) -> None:
-    """The work on a chunk, written to the store, and only then its flag.
+    """Compute a chunk, write it to the store, and only then its flag.
 
     A process that is killed on the way leaves no flag, so that the chunk is computed again. Every Zarr
     chunk belongs to one chunk of the work, and a local store puts each into place whole.
@@ -101,13 +101,13 @@ class SweepStore:
             raise UddError(f"{self.where} cannot be used for a sweep: {said}") from None
 
     def arguments(self, chunk: int) -> tuple[Any, ...]:
-        """What `work` takes."""
+        """Return the arguments of `work`."""
         place = self._grid.place(chunk)
         target = Target(self._arrays, self._done, self._grid.region(chunk), place)
         return part_of(self._spec, self._grid, chunk), self._threads, target
 
     def keep(self, chunk: int, _nothing: None) -> None:
-        """The worker has written it; whether to here, the first one shows."""
+        """Accept a chunk that the worker has written; check the store at the first one."""
         if not self._reached and not self._done[self._grid.place(chunk)]:
             raise UddError(
                 "the workers do not write to the store that was given: it must be one that they reach"
@@ -115,7 +115,7 @@ class SweepStore:
         self._reached = True
 
     def done(self) -> NDArray[np.bool_]:
-        """Which chunks are finished."""
+        """Return the mask of finished chunks."""
         return np.asarray(self._done[...], dtype=bool).ravel()
 
     def tidy(self) -> None:
@@ -159,7 +159,7 @@ def _locked(store: str | os.PathLike[str] | zarr.Group) -> Iterator[None]:
 
 
 def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, where: str) -> zarr.Group:
-    """The group of this very sweep, made if there is none."""
+    """Return the group of this sweep; make it if there is none."""
     import zarr
 
     if isinstance(store, zarr.Group):
@@ -190,7 +190,7 @@ def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, where: 
 
 
 def _make_template(group: zarr.Group, spec: SweepSpec, grid: Grid) -> None:
-    """All arrays with their fill values; the flags last, so that their presence says that all is there."""
+    """Make all arrays with their fill values; the flags last, so that they mark a complete template."""
     from zarr.codecs import ZstdCodec
 
     names = tuple(spec.over)

@@ -57,11 +57,11 @@ class Correction:
         return replace(picture, y=y, u=u, v=v)
 
     def then_mirrored(self) -> Correction:
-        """The same, with left and right exchanged at the end."""
+        """Return the correction with left and right exchanged at the end."""
         return replace(self, mirrored=not self.mirrored)
 
     def then_turned(self, turns: int) -> Correction:
-        """The same, with so many quarter turns counter-clockwise at the end."""
+        """Return the correction with quarter turns counter-clockwise at the end."""
         return replace(self, turns=(self.turns + (-turns if self.mirrored else turns)) % 4)
 
     def place(self, at: complex, size: tuple[int, int]) -> complex:

@@ -23,7 +23,7 @@ MarkSeparation = tuple[int, int, float]  # numbers of two marks, from 1, and the
 
 @dataclass(frozen=True)
 class Sigma:
-    """How well is known what is said: standard errors. 0: it is just that, and nothing in the film moves it.
+    """Standard errors of the given values. With error 0 a value is fixed.
 
     Attributes
     ----------
@@ -160,7 +160,7 @@ class TrackOptions:
         object.__setattr__(self, name, value)
 
     def _as_pendulum(self) -> None:
-        """The bob is the only mark."""
+        """Return the options for a pendulum, whose bob is the only mark."""
         more = [f.name for f in fields(self) if f.name in _OF_A_DISK and getattr(self, f.name) != f.default]
         if more:
             raise TrackError(f"{', '.join(more)}: not for a pendulum, which has a bob and a length alone")
@@ -227,7 +227,7 @@ class TrackOptions:
 
 
 def read_calibrate(said: Any) -> Calibrate:
-    """From a mapping of names to true, false or numbers.
+    """Read a mapping of names to true, false or numbers.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def read_calibrate(said: Any) -> Calibrate:
 
 
 def read_sigma(said: Any) -> Sigma:
-    """From a mapping of names to standard errors.
+    """Read a mapping of names to standard errors.
 
     Raises
     ------
@@ -323,7 +323,7 @@ def _number(value: Any) -> float:
 
 
 def positive(value: Any) -> float:
-    """A positive, finite number; TypeError or ValueError where it is none."""
+    """Check a positive, finite number; raise TypeError or ValueError for others."""
     if not _number(value) > 0:
         raise ValueError
     return float(value)

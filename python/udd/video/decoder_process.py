@@ -37,7 +37,7 @@ LISTS = {"concat", "dash", "hls", "imf", "lavfi", "rtsp", "sdp"}
 
 
 class Refused(Exception):
-    """Why the file is no film."""
+    """Error with the reason why the file is no film."""
 
 
 def main(path: str, memory: int) -> None:
@@ -119,7 +119,7 @@ def image(path: str) -> tuple[Any, dict[str, Any]]:
 
 
 def put(data: Any) -> None:
-    """Every byte to the standard output: a buffered one loses some where the process is paused."""
+    """Write every byte to the standard output; a buffered output loses bytes if the process is paused."""
     rest = memoryview(data)
     while rest:
         rest = rest[os.write(1, rest) :]
@@ -137,7 +137,7 @@ def limit(memory: int) -> None:
 
 
 def opened(path: str) -> Any:
-    """The container, if it holds a video of a reasonable size."""
+    """Open the container, if it holds a video of a reasonable size."""
     import av
 
     formats = ",".join(name for name in sorted(av.formats_available) if LISTS.isdisjoint(name.split(",")))
@@ -178,7 +178,7 @@ def capture_rate(container: Any) -> float | None:
 
 
 def packets(container: Any, stream: Any) -> tuple[int, int, array[int]]:
-    """How many coded frames the file shows, how many lie outside its edit list, and the first ones' times.
+    """Count the coded frames of the file and those outside its edit list; return also the first times.
 
     Times are in ticks from the first. Nothing is decoded.
     """
@@ -218,7 +218,7 @@ def put_frame(index: int, t: float, frame: Any, damaged: bool, turns: int) -> No
 
 
 def pixels(plane: Any) -> memoryview | bytearray:
-    """A plane's rows, without what fills them up in memory."""
+    """Return a plane's rows, without their padding in memory."""
     rows = memoryview(plane)
     if plane.line_size == plane.width:
         return rows[: plane.width * plane.height]
@@ -231,7 +231,7 @@ def pixels(plane: Any) -> memoryview | bytearray:
 def pictures(
     container: Any, stream: Any, since: float, broken: list[int]
 ) -> Iterator[tuple[int, float, Any, bool]]:
-    """All frames that decode, in order of presentation, with increasing times."""
+    """Yield all frames that decode, in order of presentation, with increasing times."""
     import av
 
     rate = stream.average_rate or stream.guessed_rate

@@ -76,7 +76,7 @@ def frame_rates(said: Any) -> tuple[tuple[int, float], ...]:
 
 
 def time_of(frame: int, rates: Sequence[tuple[int, float]]) -> float:
-    """The time [s] of a frame, at rates that hold from some frames on.
+    """Return the time [s] of a frame, at rates that hold from some frames on.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def time_of(frame: int, rates: Sequence[tuple[int, float]]) -> float:
 
 
 def real_time(t: float, slower: Sequence[tuple[float, float]]) -> float:
-    """The time [s] of what a clock shows that runs too slowly by factors, each from some time on.
+    """Convert the time [s] of a clock that runs too slowly by factors, each from some time on.
 
     Examples
     --------
@@ -207,7 +207,7 @@ class Film:
                 decoder.end()
 
     def _decoder(self) -> _Decoder:
-        """The process that is left from the last run, or a new one."""
+        """Return the process that is left from the last run, or a new one."""
         idle, self._idle = self._idle, None
         return _Decoder(self.path) if idle is None or idle.child.process.poll() is not None else idle
 
@@ -231,7 +231,7 @@ class _Decoder:
         return json.loads(line) if line else {"error": NO_FILM}
 
     def stamps(self, count: int) -> NDArray[np.int64]:
-        """The times of so many frames, in ticks, which follow the answer to a look."""
+        """Yield the times of so many frames, in ticks, which follow the answer to a look."""
         room = np.empty(count, np.int64)
         return room if self.child.fill(room) else room[:0]
 

@@ -9,7 +9,7 @@ from .reader import Picture
 
 
 def rgb(picture: Picture, full_range: bool) -> NDArray[np.uint8]:
-    """A picture as an array (height, width, 3) of codes in red, green, blue."""
+    """Convert a picture to an array (height, width, 3) of codes in red, green, blue."""
     import cv2
 
     h, w = picture.y.shape

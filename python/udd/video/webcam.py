@@ -38,13 +38,13 @@ class Source(Protocol):
     """The part of `cv2.VideoCapture` that is used."""
 
     def isOpened(self) -> bool:
-        """Whether there is a camera."""
+        """Return True if there is a camera."""
 
     def read(self) -> tuple[bool, Any]:
         """Wait for the next frame: whether there is one, and BGR (height, width, 3)."""
 
     def get(self, propId: int, /) -> float:
-        """A property; 0 where the camera does not know it."""
+        """Return a property; 0 if the camera does not have it."""
 
     def release(self) -> None:
         """Let go of the camera."""
@@ -96,7 +96,7 @@ class Recording:
         return link_to(self.path, str(self))
 
     def __str__(self) -> str:
-        """The recording in one sentence."""
+        """Return the recording in one sentence."""
         rate, last = 1 / self.interval, self.t[-1]
         what = f"{len(self.t)} frames in {last:.2f} s, {rate:.1f} a second by the {self.clock}'s clock"
         if not self.lost:
@@ -261,7 +261,7 @@ class _Shots:
                 yield t, picture
 
     def _raw(self) -> Iterator[tuple[float, float, NDArray[np.uint8]]]:
-        """The camera's time [s], the computer's, and the picture (BGR)."""
+        """Return the camera's time [s], the computer's, and the picture (BGR)."""
         shape: tuple[int, ...] | None = None
         while True:
             there, picture = self.source.read()

@@ -67,11 +67,11 @@ TEXT = Format("text table", lambda _head, _suffix: True, text.read)
 
 
 def format_of(head: bytes, suffix: str) -> Format:
-    """The kind of a file, by its first bytes and its suffix."""
+    """Return the kind of a file, by its first bytes and its suffix."""
     return next((one for one in FORMATS if one.is_so(head, suffix.lower())), TEXT)
 
 
 def is_table(head: bytes, suffix: str = "") -> bool:
-    """Whether a file with these first bytes may hold a table, rather than a film."""
+    """Return True if a file with these first bytes may hold a table, rather than a film."""
     utf16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
     return format_of(head, suffix) is not TEXT or utf16 or b"\0" not in head

@@ -86,7 +86,7 @@ def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 
 def _named(tables: list[Table], given: list[str]) -> Table:
-    """The table whose columns are as many as the names that were given."""
+    """Return the table with as many columns as the given names."""
     for table in tables:
         if len(table.columns) == len(given):
             return replace(table, headings=[Heading(name, name) for name in given])

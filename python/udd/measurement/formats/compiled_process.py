@@ -48,7 +48,7 @@ Libraries = dict[str, Any]
 
 
 class Refused(Exception):
-    """Why the file is not read."""
+    """Error with the reason for not reading a file."""
 
 
 class Exceeded(Exception):
@@ -210,7 +210,7 @@ COPY = "copy the data into the file itself"
 
 
 def inside(path: str, item: Any, h5py: Any) -> Any:
-    """The data set, if its numbers are stored in the file itself."""
+    """Return the data set, if its numbers are stored in the file itself."""
     plan = item.get_create_plist()
     if plan.get_external_count() > 0:
         raise Refused(f"{short(path)!r} is stored in another file (external storage): {COPY}")
@@ -307,17 +307,17 @@ def parquet_column(k: int, column: Any, pa: Any, out: Output) -> None:
 
 
 def last(path: str) -> str:
-    """The last part of a name as ``run/theta`` or ``run.theta``."""
+    """Return the last part of a name as ``run/theta`` or ``run.theta``."""
     return path.replace(".", "/").rsplit("/", 1)[-1]
 
 
 def short(path: str) -> str:
-    """A path that fits into a sentence."""
+    """Shorten a path to fit into a sentence."""
     return path if len(path) <= 80 else f"{path[:77]}..."
 
 
 def plain(value: Any) -> Any:
-    """A single value as JSON knows it."""
+    """Return a single value as a JSON value."""
     first = np.asarray(value).reshape(-1)[0]
     if isinstance(first, np.number | np.bool_):
         number = first.item()

@@ -116,7 +116,7 @@ def joined(names: Sequence[str], units: Sequence[str]) -> list[str]:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """A heading without brackets as a name and what may be its unit."""
+    """Split a heading without brackets into a name and a possible unit."""
     base, *rest = _BEFORE_UNIT.split(" ".join(name.split()), maxsplit=1)
     return base, "".join(rest)
 

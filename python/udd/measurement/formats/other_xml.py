@@ -37,7 +37,7 @@ class OtherXml:
 
 
 def _first_element(head: bytes) -> bytes:
-    """The name of the first element in lower case; empty if it is no XML."""
+    """Return the name of the first element in lower case; empty if the text is no XML."""
     # In UTF-16 every letter has a zero.
     plain = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
     first = _FIRST.search(re.sub(rb"<!--.*?-->", b"", plain, flags=re.DOTALL))

@@ -47,7 +47,7 @@ class Table:
         return [heading.raw for heading in self.headings if heading.name not in ("", "_")]
 
     def find(self, asked: str) -> int | None:
-        """The column that is asked for: by its heading as it stands, else without unit, else in any case.
+        """Find a column: by its heading as it stands, else without unit, else in any case.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Table:
         return None
 
     def numbers(self, k: int) -> NDArray[np.float64]:
-        """A column as numbers, NaN where a cell is empty.
+        """Return a column as numbers, NaN for empty cells.
 
         Raises
         ------
@@ -100,7 +100,7 @@ class Table:
         return out
 
     def words(self, k: int) -> NDArray[np.str_]:
-        """A column as text, empty where a cell is.
+        """Return a column as text, empty for empty cells.
 
         Raises
         ------
@@ -122,11 +122,11 @@ class Table:
         return out
 
     def place(self, row: int) -> str:
-        """Where a row stands, in the user's terms."""
+        """Return the place of a row, in the user's terms."""
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
 
     def rows(self, pick: Sequence[int] | NDArray[np.int64]) -> Table:
-        """The table of some of its rows."""
+        """Return the table of some of its rows."""
         chosen = np.asarray(pick, dtype=np.int64)
 
         def some(column: Any) -> Any:
@@ -139,7 +139,7 @@ class Table:
 
 
 def _cells(column: list[str | None] | TextColumn) -> Iterator[tuple[str | None, int]]:
-    """The cells of a column, and how many its row has."""
+    """Return the cells of a column, and the numbers of cells of its rows."""
     return column.cells() if isinstance(column, TextColumn) else ((cell, 0) for cell in column)
 
 
@@ -148,7 +148,7 @@ def _text(cell: Any) -> str:
 
 
 def number(cell: str, comma: bool) -> float:
-    """The number in a cell, NaN where it is empty; ValueError where it is none."""
+    """Read the number in a cell, NaN if it is empty; raise ValueError for other text."""
     if cell.strip().lower() in NOTHING:
         return float("nan")
     if "_" in cell:  # Python would read 1_000

@@ -77,7 +77,7 @@ def value(text: str, memory: MemoryLimit) -> Any:
 
 @dataclass
 class Counts:
-    """How many lines there are, and how many of them may be separated by what."""
+    """Counts of lines, and of lines with each separator."""
 
     lines: int = 0
     tabs: int = 0
@@ -110,7 +110,7 @@ def _counted(lines: Lines) -> Counts:
 
 
 def _blanks_and_commas(cells: list[str]) -> bool:
-    """Whether cells between blanks are numbers with decimal commas, as ``0,04 0,39``."""
+    """Return True if cells between blanks are numbers with decimal commas, as ``0,04 0,39``."""
     if len(cells) < 2:
         return False
     some = [cell for cell in cells if not _numeric(cell, False)]
@@ -118,7 +118,7 @@ def _blanks_and_commas(cells: list[str]) -> bool:
 
 
 def _decimal_comma(lines: Lines, counts: Counts, mark: str) -> bool:
-    """Whether numbers have decimal commas; between commas only in quotes, and not where there are points."""
+    """Return True if numbers have decimal commas: between commas only in quotes, and never with points."""
     if mark != ",":
         return mark in ";\t " and counts.commas > counts.lines / 2
     if counts.quotes <= counts.lines / 2:
@@ -209,7 +209,7 @@ def _fill(out: NDArray[np.float64], cells: Sequence[str | None], comma: bool) ->
 def _header(
     lines: Lines, mark: str, comma: bool, given: list[str] | None
 ) -> tuple[list[str], int, list[str]]:
-    """The names of the columns, the number of rows up to them, and the row above them.
+    """Return the names of the columns, the number of rows up to them, and the row above them.
 
     The names are a row with a time, or the row above the first row of numbers (two numbers suffice if every
     row holds words).
@@ -247,7 +247,7 @@ def _rows(lines: Lines, mark: str) -> Iterator[list[str]]:
 def _first_row(
     lines: Lines, mark: str, is_it: Callable[[list[str]], bool]
 ) -> tuple[int, list[str], list[str]] | None:
-    """The place of the first row of a kind, and the two rows above it; None if no row is of that kind."""
+    """Return the place of the first row of a kind, and the two rows above it; None without such a row."""
     above: list[list[str]] = [[], []]
     for i, row in enumerate(_rows(lines, mark)):
         if is_it(row):
@@ -257,7 +257,7 @@ def _first_row(
 
 
 def _definitions(line: str, mark: str) -> list[str] | None:
-    """The names and units in CASSY's line ``DEF="Zeit" t / s``; None if it is another line."""
+    """Read the names and units in CASSY's line ``DEF="Zeit" t / s``; None if it is another line."""
     if not line.startswith('DEF="'):
         return None
     cells = line.removeprefix("DEF=").rstrip().split(mark if mark != " " else None)
@@ -298,7 +298,7 @@ def _without_numbers(lines: Lines, mark: str) -> MeasurementError:
 
 
 def _date(cell: str | None) -> datetime | None:
-    """The date with time in a cell (ISO 8601); None where it is none."""
+    """Read the date with time in a cell (ISO 8601); None for other text."""
     if cell is None or not _DATE.match(cell):
         return None
     try:
@@ -334,7 +334,7 @@ def _since_first(column: TextColumn, lines: NDArray[np.int32]) -> NDArray[np.flo
 
 
 def _counts(cell: str, comma: bool) -> bool:
-    """Whether a cell is a number, or a date that becomes one."""
+    """Return True if a cell is a number, or a date that becomes a number."""
     return _numeric(cell, comma) or _date(cell) is not None
 
 

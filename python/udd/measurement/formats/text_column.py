@@ -87,14 +87,14 @@ class TextColumn:
                 yield cell
 
     def picked(self, rows: NDArray[np.int64]) -> TextColumn:
-        """The column of some of its rows, in their order."""
+        """Return the column of some of its rows, in their order."""
         values = None if self.values is None else self.values[rows]
         pick = rows if self.pick is None else self.pick[rows]
         return replace(self, values=values, length=len(rows), pick=pick)
 
 
 def split(lines: list[str], mark: str) -> list[list[str]]:
-    """The cells of each line.
+    """Split each line into cells.
 
     Raises
     ------

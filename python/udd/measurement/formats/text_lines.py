@@ -79,7 +79,7 @@ class Lines:
             start, number = end, number + len(lines)
 
     def _end_of_block(self, start: int, number: int) -> int:
-        """Where a line ends that is not the last of the block's bytes."""
+        """Return the end of a line that is not the last of the block's bytes."""
         raw = self._raw
         for size in (_BLOCK, _LONGEST):
             stop = start + size

@@ -74,7 +74,7 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
 
 
 def _tree(raw: bytes, memory: MemoryLimit) -> ElementTree.Element:
-    """The root of an XML file without definitions: those may unfold without end, or name other files."""
+    """Return the root of an XML file; refuse definitions, which may expand endlessly."""
     tree, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
 
     def begin(name: str, attributes: dict[str, str]) -> None:
@@ -139,7 +139,7 @@ def _coordinates(system: ElementTree.Element) -> list[tuple[int, list[float]]]:
 
 
 def _world(coordinates: list[tuple[int, list[float]]], n: int, x: float, y: float) -> tuple[float, float]:
-    """A pixel in the axes of the project; in a picture y points down."""
+    """Convert a pixel to the axes of the project; in a picture y points down."""
     holding = [values for first, values in coordinates if first <= n] or [coordinates[0][1]]
     x0, y0, angle, x_scale, y_scale = holding[-1]
     right, up = (x - x0) / x_scale, (y0 - y) / y_scale

@@ -82,7 +82,7 @@ def clock(_lab: Lab) -> Figure:
 
 
 def after_a_push(w: float, push: float, n: int) -> tuple[Array, Array]:
-    """How far the half periods are from the undisturbed one, one by one, after a push of the state."""
+    """Compute the deviations of successive half periods from the undisturbed one, after a push."""
     still = poincare(DLE(w), n=2, transient=3000)
     half = float(still.return_times[0])
     pushed = poincare(DLE(w), n=n, transient=0, state0=still.state[-1] * (1 + push) + [0, 0, push])

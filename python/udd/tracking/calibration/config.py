@@ -45,7 +45,7 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
 
 
 def read_options(config: Config | TrackOptions | None, **given: Any) -> TrackOptions:
-    """All options, of a config and of arguments (not None), which win."""
+    """Read all options from a config and arguments; arguments (not None) take precedence."""
     if isinstance(config, TrackOptions):
         more = {name: value for name, value in given.items() if value is not None}
         return config.changed(more) if more else config

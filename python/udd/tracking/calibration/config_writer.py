@@ -62,7 +62,7 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
 
 
 def as_toml(config: Mapping[str, Any], comment: str = "") -> str:
-    """The text of the file."""
+    """Return the text of the file."""
     document = tomlkit.document()
     for line in comment.splitlines():
         document.add(tomlkit.comment(_plain(line)))

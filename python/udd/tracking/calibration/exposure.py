@@ -1,4 +1,4 @@
-"""How long the shutter is open, from the length of the streaks."""
+"""Exposure time from the length of the streaks."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def again(
     look: DiskAppearance,
     view: NDArray[np.bool_],
 ) -> float:
-    """The exposure time once more, from frames whose motion for any exposure their neighbours tell.
+    """Estimate the exposure again, from frames whose neighbours give the motion for any exposure.
 
     Gauss-Newton steps of its logarithm on the pixels about the marks, white, contrast and place left free.
     """

@@ -99,7 +99,7 @@ def turning_circle(
 def _radial(
     points: NDArray[np.complex128], turned: NDArray[np.complex128], circle: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """How centre, shift and radius move each point's distance from the circle; that distance; its scatter."""
+    """Linearise the distance of points from a circle by centre, shift and radius; return also its scatter."""
     arm = points - complex(circle[0], circle[1]) - complex(circle[2], circle[3]) / turned
     body = arm / np.abs(arm)
     picture, rest = body * turned, np.abs(arm) - circle[4]
@@ -108,7 +108,7 @@ def _radial(
 
 
 def _late(plane: NDArray[np.complex128], look: DiskAppearance, height: int) -> NDArray[np.float64]:
-    """How much later than the middle row the rows of points of the plane are exposed [s]."""
+    """Return the delay of the rows of points of the plane relative to the middle row [s]."""
     rows = look.lens.picture(plane).imag
     return np.asarray(look.readout * ((rows + 0.5) / height - 0.5))
 

@@ -1,4 +1,4 @@
-"""How long a rolling shutter takes from the first row to the last, from the rigidity of the disk alone."""
+"""Readout time of a rolling shutter, from the rigidity of the disk alone."""
 
 from __future__ import annotations
 

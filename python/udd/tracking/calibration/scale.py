@@ -1,4 +1,4 @@
-"""How many pixels a metre has: from the marks' spacing and from the disk's rim."""
+"""Scale in pixels per metre, from the spacing of the marks and from the rim."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _combined(film: Scale, said: Scale) -> Scale:
 
 
 def _from_film(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions) -> Scale | None:
-    """The film's own; None where it shows nothing that was not said."""
+    """Estimate the scale from the film; None if the film adds nothing to the given values."""
     if options.apart is not None:
         one, other, distance = options.apart
         value = float(abs(places[one - 1] - places[other - 1])) / distance

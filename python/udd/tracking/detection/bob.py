@@ -60,7 +60,7 @@ class BobColour:
 
     @property
     def pale(self) -> bool:
-        """Whether brightness must help to distinguish it."""
+        """True if the bob is so pale that brightness must help to distinguish it."""
         return float(np.hypot(*self.chroma)) < COLOURFUL
 
 

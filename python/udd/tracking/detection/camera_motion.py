@@ -1,4 +1,4 @@
-"""How the camera moved, zoomed and changed its exposure: from what stands still about the disk."""
+"""Motion, zoom and exposure of the camera, from the still background."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ class CameraMotion:
 
     @property
     def moved(self) -> NDArray[np.complex128]:
-        """How far the picture's middle is from its median place in each frame [pixels]."""
+        """Return the distance of the picture's middle from its median place in each frame [pixels]."""
         away = self.factor * self.middle + self.shift - self.middle
         return np.asarray(away - complex(np.nanmedian(away.real), np.nanmedian(away.imag)))
 
     @property
     def turned(self) -> Array:
-        """How far half the picture's diagonal moves by turning and zooming [pixels]."""
+        """Return the motion of half the picture's diagonal by roll and zoom [pixels]."""
         away = self.factor / np.nanmedian(np.abs(self.factor))
         return np.asarray(np.abs(away - complex(np.nanmedian(away.real), np.nanmedian(away.imag))))
 
@@ -76,7 +76,7 @@ class CameraMotion:
 
     @property
     def steady(self) -> bool:
-        """Whether the camera was at rest."""
+        """True if the camera was at rest."""
         if not self.is_measured.any():
             return True
         away = np.abs(self.moved) + self.turned * abs(self.middle)
@@ -85,7 +85,7 @@ class CameraMotion:
 
     @property
     def as_bright(self) -> bool:
-        """Whether the light stays nearly the same."""
+        """True if the light stays nearly the same."""
         return not self.is_measured.any() or bool(np.nanmax(np.abs(self.gain - 1)) < AS_BRIGHT)
 
     @property
@@ -136,7 +136,7 @@ class CameraMotion:
 
 
 def _about_median(motion: CameraMotion) -> CameraMotion:
-    """The same motion against the camera's usual view: the first one's roll is no better than another's."""
+    """Return the motion against the camera's usual view, because the first roll is not special."""
     if not motion.is_measured.any():
         return motion
     factor, middle = motion.factor, motion.middle
@@ -304,7 +304,7 @@ class Background:
 
 
 def _as_light(y: Plane, ratio: float) -> Plane:
-    """The picture with its codes multiplied, unless that hardly changes it."""
+    """Return the picture with its codes multiplied, unless that hardly changes it."""
     import cv2
 
     if abs(ratio - 1) < UNLIKE:
@@ -313,7 +313,7 @@ def _as_light(y: Plane, ratio: float) -> Plane:
 
 
 def _seen_from(y: Plane, factor: complex, shift: complex) -> Plane:
-    """The picture as the first one's camera would have taken it."""
+    """Return the picture as the camera of the first frame would have taken it."""
     import cv2
 
     if factor == 1 and shift == 0:

@@ -133,7 +133,7 @@ def _corners(patches: list[Blobs], without: int, slack: float) -> list[tuple[flo
 
 
 def _sight(centre: complex, arm: complex, mark: int, area: NDArray[np.float64]) -> Sight | None:
-    """The disk with its centre and the arm to one of its marks, if the marks' areas fit."""
+    """Return the disk with its centre and the arm to a mark, if the marks' areas fit."""
     ratio = np.sqrt(area) / (2 * abs(arm) + 1e-9)
     if area.max() > 4 * area.min() or ratio.max() > 0.4 or ratio.min() < 0.02:
         return None

@@ -19,14 +19,14 @@ GONE = "gone: the disk has left the wheels"
 
 
 def unusable(picture: Picture) -> str:
-    """Why nothing can be seen in a picture; empty where something may be."""
+    """Return the flag of a picture that shows nothing; empty if it may show something."""
     if picture.damaged:
         return DAMAGED
     return BLACK if float(picture.y[::8, ::8].std()) < BLANK else ""
 
 
 def is_copy(y: Plane, last: Plane, places: Iterable[complex], reach: int) -> bool:
-    """Whether no edge moved within `reach` pixels of some places; a codec does not copy exactly."""
+    """Return True if no edge moved within `reach` pixels of some places; a codec does not copy exactly."""
     changed, size = 0, 0
     for place in places:
         r, c = int(place.imag), int(place.real)
@@ -37,10 +37,10 @@ def is_copy(y: Plane, last: Plane, places: Iterable[complex], reach: int) -> boo
 
 
 def lost(why: str) -> str:
-    """The flag of a frame in which what is followed was not found."""
+    """Return the flag of a frame in which the object was not found."""
     return f"lost: {why}"
 
 
 def is_lost(flag: str) -> bool:
-    """Whether a frame may be tried again."""
+    """Return True if a frame may be tried again."""
     return flag.startswith("lost")

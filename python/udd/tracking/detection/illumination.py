@@ -28,7 +28,7 @@ def evenness(
     body: NDArray[np.complex128],
     light: Array,
 ) -> NDArray[np.float32] | None:
-    """By what to multiply each pixel's light, (height, width), so that the disk is as bright everywhere.
+    """Return the factor of each pixel's light, (height, width), that makes the disk evenly bright.
 
     Under light that grows to one side both edges of a mark seem to lie on that side. The disk is white and
     comes everywhere: the logarithm of its light is a parabola of the place and a constant for each picture,

@@ -21,7 +21,7 @@ MOST = 40  # ways to see the disk in one picture that are kept
 def sightings(
     pictures: Sequence[Picture], layout: Layout, scale: float | None = None, still: bool | None = None
 ) -> list[Sight | None]:
-    """The disk in each picture that shows all its marks (or, of four and more, all but one).
+    """Find the disk in each picture that shows all its marks (or, of four and more, all but one).
 
     `scale` [pixels per metre] helps where little else tells marks from patches of the same colours. `still`:
     of patches that stand still alone, or of those that do not; if not given, of those, else of all.
@@ -52,7 +52,7 @@ def coloured(picture: Picture, layout: Layout) -> list[Blobs]:
 
 
 def _merged(along: NDArray[np.float32], layout: Layout) -> list[NDArray[np.float32]]:
-    """For each mark how far a pixel goes along its colour, or that of any mark with the same one."""
+    """Return the component of each pixel along each mark's colour, or that of any mark with this colour."""
     return [along[row].max(axis=0) for row in same_colour(layout.chroma)]
 
 
@@ -81,7 +81,7 @@ def matches(
 def _match(
     patches: list[Blobs], body: NDArray[np.complex128], centre: complex, turn: complex
 ) -> tuple[int, float, Sight] | None:
-    """The rigid fit, at any scale, to all blobs near the places that two of them ask for."""
+    """Fit a rigid body, at any scale, to all blobs near the places that two of them predict."""
     at, seen, areas = [], [], []
     for k, patch in enumerate(patches):
         if len(patch.centre):

@@ -60,13 +60,13 @@ def visible(
 def bare(
     sight: Sight, height: int, width: int, body: NDArray[np.complex128]
 ) -> tuple[tuple[slice, slice], NDArray[np.bool_]]:
-    """A box of rows and columns, and its pixels that should show the bare disk."""
+    """Return a box of rows and columns, and its pixels that should show the bare disk."""
     box = _box(sight, height, width)
     return box, _should_be_bare(sight, box, body)
 
 
 def _middle(codes: NDArray[np.uint8]) -> float:
-    """The median of many codes, by counting them."""
+    """Return the median of many codes, by counting them."""
     return float(np.searchsorted(np.bincount(codes).cumsum(), 0.5 * codes.size))
 
 

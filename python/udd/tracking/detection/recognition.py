@@ -1,4 +1,4 @@
-"""Which of the things that look like the disk is the disk: not what stands still, nor a mirror image."""
+"""Choice of the disk among similar objects: neither one at rest nor a mirror image."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def recognise(film: Film, look_over: Survey, options: TrackOptions) -> Recogniti
 
 
 def placed(options: TrackOptions, correction: Correction, size: tuple[int, int]) -> TrackOptions:
-    """The options with what they say of the picture as it lies after a turn or a mirror."""
+    """Return the options with their places after a turn or a mirror of the picture."""
     changed: dict[str, Any] = {}
     if options.pivot is not None:
         at = correction.place(complex(*options.pivot), size)
@@ -99,7 +99,7 @@ def placed(options: TrackOptions, correction: Correction, size: tuple[int, int])
 def _sights(
     pictures: Sequence[Picture], options: TrackOptions, still: bool | None = None
 ) -> tuple[list[Sight | None], int | None]:
-    """The disk in each picture, and the mark that is missing; of patches that stand `still`, or do not."""
+    """Find the disk in each picture, and the missing mark; use patches at rest, or moving ones."""
     inside = [options.inside(p) for p in pictures]
     if options.layout.standard:
         return sightings(inside) if still is None else sightings(inside, lambda every: split(every, still))
@@ -113,7 +113,7 @@ def _count(sights: Sequence[Sight | None]) -> int:
 def _moving(
     film: Film, pictures: Sequence[Picture], sights: list[Sight | None], options: TrackOptions
 ) -> tuple[list[Sight | None], Sight | None]:
-    """The sights, or those of another disk that moves, and what stands still and looks like it."""
+    """Return the moving sights, or those of another disk, and the similar objects at rest."""
     seen = [s for s in sights if s is not None]
     if len(seen) < FEWEST:
         return sights, None
@@ -149,7 +149,7 @@ def _without(still: Sight | None, options: TrackOptions, shape: tuple[int, ...])
 
 
 def _like(sights: Sequence[Sight], usual: Sight) -> int:
-    """How many sights are where this one is."""
+    """Count the sights at the place of this one."""
     return sum(
         abs(s.centre - usual.centre) < SAME_PLACE
         and abs(np.angle(np.exp(1j * (s.angle - usual.angle)))) < SAME_ANGLE
@@ -158,7 +158,7 @@ def _like(sights: Sequence[Sight], usual: Sight) -> int:
 
 
 def _elsewhere(pictures: Sequence[Picture], disk: Sight) -> complex | None:
-    """The middle of what moves outside a disk, if it is as large as a part of the disk."""
+    """Return the middle of the motion outside a disk, if it is as large as a part of the disk."""
     import cv2
 
     whole = [p for p in pictures if not p.damaged]

@@ -94,7 +94,7 @@ def slowest(bursts: list[list[Picture]], sights: list[Sight | None]) -> list[tup
 
 
 def repeats_last(items: list[Any], sights: list[Sight]) -> list[Any]:
-    """The same items, those that show the disk almost as an earlier one does moved to the end."""
+    """Sort the items so that those that show the disk almost as an earlier one does come last."""
     first: list[int] = []
     again: list[int] = []
     for k, sight in enumerate(sights):

@@ -38,7 +38,7 @@ def sharpened(light: NDArray[np.float32], corners: Complexes, cells: int) -> Com
 def _edge(
     light: NDArray[np.float32], start: complex, end: complex, cells: int
 ) -> tuple[complex, complex] | None:
-    """A point and the direction of the line through an edge; the tag's inside is on its right (v down)."""
+    """Fit the line through an edge: a point and its direction; the tag is on its right (v down)."""
     import cv2
 
     along = (end - start) / abs(end - start)
@@ -80,7 +80,7 @@ def _edge(
 
 
 def _meet(first: tuple[complex, complex], second: tuple[complex, complex]) -> complex:
-    """Where two lines cross."""
+    """Return the crossing of two lines."""
     (a, d), (b, e) = first, second
     cross = d.real * e.imag - d.imag * e.real
     if abs(cross) < 1e-9:

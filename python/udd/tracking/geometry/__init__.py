@@ -1,1 +1,1 @@
-"""How a pose of the disk looks in a picture."""
+"""Appearance of a pose of the disk in a picture."""

@@ -83,7 +83,7 @@ def pivot(
 def _rolling(
     rows: list[NDArray[np.complex128]], values: list[NDArray[np.complex128]]
 ) -> tuple[list[NDArray[np.complex128]], list[NDArray[np.complex128]]]:
-    """The windows in which the disk rolls like in most: not those in which it was let go, or fell."""
+    """Return the windows in which the disk rolls as in most, without release and fall."""
     for _ in range(3):
         normal = sum((d.conj().T @ d for d in rows), np.zeros((2, 2), dtype=complex))
         right = sum((d.conj().T @ v for d, v in zip(rows, values, strict=True)), np.zeros(2, dtype=complex))
@@ -105,7 +105,7 @@ class Contact:
     drive: complex
 
     def carry(self, centre: complex, turn: float, dt: float) -> complex:
-        """Where the disk's centre is after it turned by `turn` [rad] in `dt` [s] at a steady rate."""
+        """Return the disk's centre after a rotation by `turn` [rad] in `dt` [s] at a steady rate."""
         spin = np.exp(1j * turn)
         share = (spin - 1) / (1j * turn) if abs(turn) > 1e-6 else 1.0
         return complex(self.place + (centre - self.place) * spin + self.drive * dt * share)
@@ -118,7 +118,7 @@ class Contact:
 def rough_contact(
     before: NDArray[np.complex128], after: NDArray[np.complex128], turn: Array, dt: Array, reach: float
 ) -> Contact | None:
-    """The contact from pairs of neighbouring frames, each an exact finite motion at a steady rate."""
+    """Estimate the contact from pairs of neighbouring frames: exact finite motions at a steady rate."""
     if len(before) < 4:
         return None
     spin = np.exp(1j * turn)
@@ -156,7 +156,7 @@ def windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def support(view: NDArray[np.bool_]) -> complex | None:
-    """A guess at the contact from what stands before the disk: the wheel's axle, widest near the top."""
+    """Guess the contact from the support before the disk: the wheel's axle, widest near the top."""
     rows = np.flatnonzero((~view).any(axis=1))
     if len(rows) < 10:
         return None

@@ -33,12 +33,12 @@ class Lens:
 
     @property
     def plain(self) -> bool:
-        """Whether the map changes nothing."""
+        """Return True if the map changes nothing."""
         return not (self.curve or self.tilt_u or self.tilt_v or self.aspect or self.shear)
 
     @property
     def row(self) -> tuple[float, ...]:
-        """As eight numbers: middle u, v, size, curve, tilts, aspect, shear."""
+        """Return the eight numbers: middle u, v, size, curve, tilts, aspect, shear."""
         bent = (self.size, self.curve, self.tilt_u, self.tilt_v, self.aspect, self.shear)
         return (self.middle.real, self.middle.imag, *bent)
 
@@ -70,7 +70,7 @@ class Lens:
         return np.asarray(self.middle + self.size * p)
 
     def locals(self, plane: Complexes) -> Array:
-        """The map near points (n,) of the plane, linearised.
+        """Linearise the map near points (n,) of the plane.
 
         Rows of eight: the point in the picture (u, v), in the plane (u, v), d plane / d picture (2, 2).
         """
@@ -153,7 +153,7 @@ def calibrate(
 
 
 def _layout(points: Complexes, body: Complexes) -> Complexes:
-    """The marks' places on the disk, from the frame that shows them best."""
+    """Return the marks' places on the disk, from the frame that shows them best."""
     best = points[np.argmax(np.isfinite(points).sum(axis=1))]
     seen = np.isfinite(best)
     part, at = body[seen] - body[seen].mean(), best[seen] - best[seen].mean()

@@ -22,13 +22,13 @@ class Mark:
 
     @property
     def row(self) -> NDArray[np.float64]:
-        """As six numbers: place u, v, half sides, turn, level."""
+        """Return the six numbers: place u, v, half sides, turn, level."""
         return np.array([self.place.real, self.place.imag, *self.half, self.turn, self.level])
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How the disk moves during the exposure, about its pose in the middle of it.
+    """Motion of the disk during the exposure, about its pose in the middle of it.
 
     At the share s of the exposure (-1/2 to 1/2) it is off by s shift + s^2 bend [pixels] and
     s turn + s^2 twist [rad]. `rate` [pixels/s], `spin` [rad/s] and their derivatives `bending` and
@@ -55,7 +55,7 @@ class Motion:
 
     @property
     def row(self) -> NDArray[np.float64]:
-        """As six numbers: shift u, v, turn, bend u, v, twist."""
+        """Return the six numbers: shift u, v, turn, bend u, v, twist."""
         shift, bend = complex(self.shift), complex(self.bend)
         return np.array([shift.real, shift.imag, self.turn, bend.real, bend.imag, self.twist])
 
@@ -68,7 +68,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class DiskAppearance:
-    """How the marked disk looks in this film."""
+    """Appearance of the marked disk in this film."""
 
     marks: list[Mark]
     psf: float  # blur of lens and pixels, standard deviation [pixels]
@@ -91,7 +91,7 @@ class DiskAppearance:
         return np.tile(self.light, (len(self.marks), 1)) if self.mixed is None else self.mixed
 
     def streak(self, motion: Motion) -> float:
-        """How far the outermost mark moves while the shutter is open, at most [pixels]."""
+        """Return an upper limit of the outermost mark's motion during the exposure [pixels]."""
         return abs(motion.shift) + abs(motion.turn) * self.reach
 
     @cached_property
@@ -114,7 +114,7 @@ class Pose:
 
 
 def moved_by_pose(arms: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """How a pose (u, v, beta) moves points at `arms` (n,) from the disk's centre, (n, 2, 3)."""
+    """Return the derivatives of points at `arms` (n,) from the disk's centre by its pose, (n, 2, 3)."""
     maps = np.zeros((len(arms), 2, 3))
     maps[:, 0, 0] = maps[:, 1, 1] = 1.0
     maps[:, 0, 2], maps[:, 1, 2] = -arms.imag, arms.real

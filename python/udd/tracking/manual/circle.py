@@ -21,7 +21,7 @@ class Circle:
 
 
 def circle(points: NDArray[np.complex128], sigma: float) -> Circle | None:
-    """The circle nearest to three points or more, each off by `sigma` [pixels]; None where they fix none."""
+    """Fit a circle to three points or more, each with the error `sigma` [pixels]; None if undetermined."""
     z = np.asarray(points, dtype=np.complex128)
     middle = z.mean()
     off = z - middle

@@ -101,7 +101,7 @@ def click(
 
 
 def _figure() -> Figure:
-    """An empty figure that a person can see and click on.
+    """Return an empty figure that a person can see and click on.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From a click to the patch of one colour about it: its middle, its colour, and how well they are known."""
+"""Patch of one colour around a click: its middle, its colour, and their errors."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ class Patch:
 
     @property
     def refined(self) -> bool:
-        """Whether the patch tells the centre better than the click."""
+        """True if the patch gives the centre better than the click."""
         return self.sigma <= FOUND
 
     def holds(self, at: complex) -> bool:
-        """Whether a place lies within the patch, or is where it was clicked."""
+        """Return True if a place lies within the patch, or near the click."""
         return bool(abs(at - self.centre) < max(0.5 * np.sqrt(self.area), 2 * self.sigma))
 
 
 def patch(picture: Picture, at: complex, full_range: bool, miss: float = CLICK) -> Patch | None:
-    """The patch of like colour about a place clicked to `miss` [pixels]; None where there is no colour.
+    """Find the patch of like colour around a place clicked to `miss` [pixels]; None without a colour.
 
     A pixel belongs to it by the direction of its colour and half its strength. A patch that is no whole
     rectangle (partly hidden, or grown into its surroundings) leaves the click in place.
@@ -106,7 +106,7 @@ def _middle(part: NDArray[np.bool_], share: NDArray[np.float32]) -> complex:
 
 
 def _rectangle(part: NDArray[np.bool_]) -> tuple[float, NDArray[np.complex128]]:
-    """The smallest rectangle about a patch: its area in samples, and its corners in the picture."""
+    """Return the smallest rectangle around a patch: its area in samples, and its corners in the picture."""
     import cv2
 
     middle, sides, angle = cv2.minAreaRect(np.column_stack(np.nonzero(part)[::-1]).astype(np.float32))
@@ -128,7 +128,7 @@ def _grown(part: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
 
 
 def _of(part: NDArray[np.bool_], inner: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The inside of a patch, or all of one that has none."""
+    """Return the inside of a patch, or all of a patch without an inside."""
     return inner if inner.any() else part
 
 

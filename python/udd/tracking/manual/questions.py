@@ -107,7 +107,7 @@ class ClickSession:
 
     @property
     def done(self) -> bool:
-        """Whether all is answered."""
+        """True if all questions are answered."""
         return not self.question
 
     @property
@@ -133,7 +133,7 @@ class ClickSession:
         return True
 
     def press(self, at: complex) -> None:
-        """A click at a place in the picture [pixels]."""
+        """Handle a click at a place in the picture [pixels]."""
         self.remark = ""
         height, width = self.picture.y.shape
         if not (-0.5 <= at.real <= width - 0.5 and -0.5 <= at.imag <= height - 0.5):
@@ -153,7 +153,7 @@ class ClickSession:
             self._pair("region", at, NARROWEST, "too near to each other for a region")
 
     def release(self, at: complex) -> None:
-        """The button let go: of a region that is dragged, the second corner."""
+        """Handle the released button: the second corner of a region."""
         first = self.answers.region
         if self.question == "region" and len(first) == 1 and abs(at - first[0]) > NARROWEST:
             self.press(at)
@@ -207,7 +207,7 @@ class ClickSession:
         self.history.append(_State(self.question, answers))
 
     def _after(self, question: str) -> str:
-        """The question after one."""
+        """Return the question after another."""
         asked = [name for name in ASKED if self._wanted(name)] + [""]
         return asked[asked.index(question) + 1] if question else asked[0]
 
@@ -253,7 +253,7 @@ class ClickSession:
             self._put(replace(self.answers, region=(*here, at)))
 
     def _lacking(self) -> str:
-        """Why the present question cannot be left; empty where it can."""
+        """Return the reason why the present question cannot be left; empty if it can."""
         a = self.answers
         if self.question == "marks" and a.marks:
             return _faults(a.marks)
@@ -287,7 +287,7 @@ class ClickSession:
         return circle(np.array(rim), self.miss) if len(rim) > 2 else None
 
     def _disk(self) -> tuple[complex, float, float | None]:
-        """The disk's centre, its standard error, and the radius where the edge was clicked [pixels]."""
+        """Return the disk's centre, its standard error, and the radius if the edge was clicked [pixels]."""
         found = self.edge
         if found is None:
             return self.answers.rim[0], CENTRE * self.miss, None
@@ -339,7 +339,7 @@ def _faults(marks: tuple[Patch, ...]) -> str:
 
 
 def _layout(marks: tuple[Patch, ...], centre: complex, scale: float) -> list[dict[str, Any]]:
-    """The marks as in a config file, turned so that the first one is above the centre."""
+    """Return the marks as in a config file, turned so that the first one is above the centre."""
     colours = _paints(marks)
     z = (np.array([m.centre for m in marks]) - centre) / scale
     first = Layout(tuple(complex(p) for p in z), tuple(colours)).first
@@ -351,7 +351,7 @@ def _layout(marks: tuple[Patch, ...], centre: complex, scale: float) -> list[dic
 
 
 def _paints(marks: tuple[Patch, ...]) -> list[tuple[int, int, int]]:
-    """The marks' colours; those of one paint in uneven light are one."""
+    """Return the marks' colours; those of one paint in uneven light are equal."""
     chroma = Layout(tuple(m.centre for m in marks), tuple(m.colour for m in marks)).chroma
     unit = chroma / np.maximum(np.hypot(*chroma.T), 1e-9)[:, None]
     alike = unit @ unit.T > SAME_PAINT

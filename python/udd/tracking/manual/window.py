@@ -42,7 +42,7 @@ class Window:
         self._draw()
 
     def _place(self, event: Any) -> complex | None:
-        """Where in the frame an event was [pixels]; None outside, and while the toolbar zooms or pans."""
+        """Return the place of an event in the frame [pixels]; None outside, and if the toolbar is in use."""
         bar: Any = getattr(self.figure.canvas, "toolbar", None)
         if event.inaxes is not self.shown.axes or (bar is not None and bar.mode):
             return None

@@ -82,14 +82,14 @@ def refine(
 
 
 def _like(marks: list[Mark], body: NDArray[np.complex128]) -> list[Mark]:
-    """The marks at the places of `body`, as large as they are."""
+    """Return the marks at the places of `body`, with their sizes."""
     now = np.array([m.place for m in marks])
     factor = float(np.vdot(body, now).real / np.vdot(body, body).real)
     return [replace(m, place=complex(factor * z)) for m, z in zip(marks, body, strict=True)]
 
 
 def places(look: DiskAppearance, frames: Sequence[Frame], view: NDArray[np.bool_]) -> NDArray[np.complex128]:
-    """Where the marks themselves are in the picture, shape (frames, 4); NaN for those not well seen."""
+    """Measure the places of the marks in the picture, shape (frames, 4); NaN for poor views."""
     out = np.full((len(frames), len(look.marks)), np.nan, dtype=np.complex128)
     for row, (y, pose, motion) in zip(out, frames, strict=True):
         fit = align(y, view, look, pose, motion, [1.6, 0.8, 0.5, 0.3], gain_slack=0.5)

@@ -32,7 +32,7 @@ class Picture(NamedTuple):
 
 
 class Appearing(NamedTuple):
-    """How the disk shows, as the core reads it: see `align_marks` there."""
+    """Appearance of the disk as the core reads it: see `align_marks` there."""
 
     lights: Array
     look: tuple[float, ...]
@@ -42,7 +42,7 @@ class Appearing(NamedTuple):
 
 @dataclass(frozen=True)
 class Sighting:
-    """Where one mark is against where it was expected.
+    """Observation of a mark, relative to its expected place.
 
     `offset` (du, dv) [pixels] and its information matrix (2, 2) [1 / pixel^2]: a mark of which only
     one edge is seen informs across that edge alone.
@@ -142,7 +142,7 @@ def beyond_place(shape: Array, base: Array, s: Sighting) -> Array:
 
 
 def seen_at(look: DiskAppearance, pose: Pose, motion: Motion, height: int) -> tuple[Array, Array]:
-    """For each mark the pose (n, 3) that its rows of the picture see, and its map (n, 8).
+    """Return the pose (n, 3) during the rows of each mark, and its map (n, 8).
 
     A rolling shutter sees each row at a time of its own; within a mark that is a shear.
     """

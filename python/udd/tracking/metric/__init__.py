@@ -1,1 +1,1 @@
-"""From pixels to metres, with errors."""
+"""Conversion from pixels to metres, with errors."""

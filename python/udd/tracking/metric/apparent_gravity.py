@@ -45,7 +45,7 @@ class ApparentGravity:
 
     @property
     def is_known(self) -> bool:
-        """Whether the motion determines it to a fifth."""
+        """True if the motion determines it to a fifth."""
         return bool(np.isfinite(self.sigma) and self.sigma < 0.2 * abs(self.value))
 
 

@@ -87,7 +87,7 @@ def meta_of(
     doubtful: int,
     turned: Wobble,
 ) -> dict[str, Any]:
-    """The header of the measurement."""
+    """Return the header of the measurement."""
     missing = max(0, film.promised - len(tracks))
     if missing or film.broken:
         warnings.warn(

@@ -75,7 +75,7 @@ def slow_parts(t: Array, centre: NDArray[np.complex128], angle: Array) -> list[S
 
 
 def _pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray[np.intp]) -> complex:
-    """The contact, each window with a drive of its own; not from those in which the clock changes."""
+    """Estimate the contact, with a drive for each window, from windows with a constant clock."""
     rests = []
     for a in range(0, len(good) - WINDOW, WINDOW // 2):
         rows = good[a : a + WINDOW]
@@ -96,7 +96,7 @@ def _pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray
 
 
 def _speeds(t: Array, away: NDArray[np.complex128], angle: Array, good: NDArray[np.intp]) -> Array:
-    """The drive over each interval between frames in which the disk is seen, along its usual direction."""
+    """Return the drive over each interval between frames with the disk, along its usual direction."""
     turn = np.diff(angle[good])
     spin = np.exp(1j * turn)
     share = np.where(np.abs(turn) > 1e-6, (spin - 1) / np.where(turn == 0, 1, 1j * turn), 1)
@@ -118,7 +118,7 @@ def _joined(edges: list[int], smooth: Array) -> list[int]:
 
 
 def _sharpened(edges: list[int], speed: Array) -> list[int]:
-    """The same edges where they divide best."""
+    """Move the edges to their best places."""
     out = list(edges)
     for k in range(1, len(edges) - 1):
         low, high = out[k - 1] + 2, out[k + 1] - 2

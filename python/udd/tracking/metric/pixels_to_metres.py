@@ -1,4 +1,4 @@
-"""From pixels to metres: scale, contact point, honest errors."""
+"""Conversion from pixels to metres: scale, contact point, errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LONG = 1.0  # s: over a longer gap the rate may have done anything
 
 @dataclass(frozen=True)
 class Camera:
-    """How the picture maps to the plane of the disk."""
+    """Map from the picture to the plane of the disk."""
 
     scale: float  # pixels per metre
     scale_sigma: float

@@ -1,4 +1,4 @@
-"""How large the errors of a pose are, judged by how well the marks of one disk agree with each other."""
+"""Errors of a pose, from the agreement of the marks of one disk."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _usual(
 
 
 def _belief(each: Array, spare: NDArray[np.int_]) -> float:
-    """By moments, from misfits per spare coordinate with the mean 1: chance alone scatters them by 2 / spare.
+    """Estimate by moments, from misfits per spare coordinate with mean 1: chance scatters them by 2 / spare.
 
     A variance with relative scatter s has 1 / s more than 2 of its inverse's degrees of freedom in doubles.
     """

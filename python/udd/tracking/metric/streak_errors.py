@@ -69,7 +69,7 @@ def unit_covariance(
 def _marks(
     tracks: Tracks, look: DiskAppearance, off: Array, around: LocalMotion, k: int
 ) -> tuple[Array, Array] | None:
-    """How the pose moves a frame's marks, (2 marks, 3), and what they are off, (2 marks,).
+    """Return the derivatives of a frame's marks by the pose, (2 marks, 3), and their residuals, (2 marks,).
 
     Each mark has a row along its streak and one across, both in units of the noise assumed. None where it is
     not known whither the marks move.

@@ -97,7 +97,7 @@ class _Way:
 
     @property
     def pieces(self) -> float:
-        """How many accelerations follow each other in the gap."""
+        """Return the number of successive accelerations in the gap."""
         return 1 + self.gap / MEMORY
 
     def cost(self, start: float, end: float) -> float:

@@ -129,7 +129,7 @@ def _worst(fit: Fit) -> tuple[int, float]:
 
 
 def _on_the_disk(picture: Picture, state: TrackerState, pose: Pose) -> bool:
-    """Whether the disk is where the marks say: bare and bright inside the square of the marks."""
+    """Return True if the marks enclose a bare and bright disk."""
     look = state.look
     half = np.hypot(*look.marks[0].half)
     inner = 0.7 * (look.reach - half) * BARE
@@ -196,7 +196,7 @@ def _motions(past: list[PoseSample], pose: Pose, t: float, state: TrackerState, 
 
 
 def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose | None:
-    """Where the disk will be: its angle by extrapolation, its centre by turning about the contact."""
+    """Predict the pose: the angle by extrapolation, the centre by rotation about the contact."""
     if not past:
         return None
     last = past[-1]
@@ -237,7 +237,7 @@ def _motion(past: list[PoseSample], pose: Pose, t: float, state: TrackerState) -
 
 
 def along_contact(state: TrackerState, pose: Pose, spin: float, change: float = 0.0) -> Motion:
-    """The path of a disk that turns about the contact at the rate `spin`, itself changing."""
+    """Return the path of a disk that rotates about the contact at the varying rate `spin`."""
     contact = state.contact
     assert contact is not None
     rate = contact.velocity(pose.centre, spin)
@@ -248,7 +248,7 @@ def along_contact(state: TrackerState, pose: Pose, spin: float, change: float = 
 def repeats(
     y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before: Pose, look: DiskAppearance
 ) -> bool:
-    """Whether a frame is a copy of the last although the disk should have moved."""
+    """Return True if a frame is a copy of the last although the disk should have moved."""
     reach = look.reach
     if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
         return False

@@ -1,4 +1,4 @@
-"""How each frame came to its pose: marks, completeness, residual, blur, method, and remarks."""
+"""Quality of each frame's pose: marks, completeness, residual, blur, method, and remarks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENOUGH = 3  # marks: two leave one coordinate to judge by
 
 
 def quality(tracks: Tracks, given: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
-    """The columns of `Measurement.quality`; `given`: frames with a pose in the table."""
+    """Return the columns of `Measurement.quality`; `given`: frames with a pose in the table."""
     used = np.isfinite(tracks.chi2)
     left = tracks.residuals
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -39,7 +39,7 @@ def remarks(
     twice: bool,
     since: Sequence[tuple[int, str]] = (),
 ) -> list[str]:
-    """The flags, with `gap` and `degraded` where a frame holds a pose; `twice`: of two passes.
+    """Return the flags, with `gap` and `degraded` for frames with a pose; `twice`: of two passes.
 
     `since`: numbers of frames from which on all are in doubt, and why.
     """
@@ -63,7 +63,7 @@ def remarks(
 
 
 def missing_before(t: NDArray[np.float64]) -> list[int]:
-    """How many frames are missing before each, by the intervals about it: a camera may slow down for good."""
+    """Count the missing frames before each, by the intervals around it: a camera may slow down for good."""
     steps = np.diff(t)
     out = [0]
     for k, step in enumerate(steps):

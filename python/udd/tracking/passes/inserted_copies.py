@@ -69,7 +69,7 @@ def inserted_copies(t: Array, places: Places, flag: Sequence[str], noise: float)
 def _at(
     k: int, t: Array, places: Places, seen: NDArray[np.bool_], flags: Sequence[str], noise: float
 ) -> tuple[int, bool]:
-    """How many copies of frame k - 1 begin with frame k, and whether they delay what comes after."""
+    """Count the copies of frame k - 1 that begin with frame k; return True if they delay later frames."""
     marked = 0
     while k + marked < len(t) and flags[k + marked].startswith(REPEATED):
         marked += 1
@@ -103,7 +103,7 @@ class _Sides:
 
     @classmethod
     def about(cls, k: int, last: int, seen: NDArray[np.bool_], around: int, degree: int) -> _Sides | None:
-        """Those about frames k to last - 1; None if too few are seen."""
+        """Return the frames around k to last - 1; None if too few are seen."""
         before = np.flatnonzero(seen[max(k - 2 * around, 0) : k])[-around:] + max(k - 2 * around, 0)
         after = last + np.flatnonzero(seen[last : last + 2 * around])[:around]
         return cls(before, after, degree) if len(before) == len(after) == around else None
@@ -134,7 +134,7 @@ class _Sides:
         return gain if scatter < _GOOD and gain > _CLEARLY else None
 
     def _rest(self, t: Array, places: Places, rows: NDArray[np.int64]) -> float:
-        """The sum of squares about a polynomial through some places, pixels squared."""
+        """Return the sum of squares about a polynomial through some places, pixels squared."""
         x = t[rows] - t[rows].mean()
         powers = np.vander(x / np.abs(x).max(), self.degree + 1)
         seen = np.column_stack([places[rows].real, places[rows].imag])

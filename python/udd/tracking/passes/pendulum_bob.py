@@ -102,7 +102,7 @@ class BobTracker:
 
 
 def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
-    """Whether a bob is seen whole: light changes its size little by little, what hides it does so at once."""
+    """Return a mask of whole bobs: light changes their size slowly, but an obstacle at once."""
     seen = [a for a in recent if a is not None]
     usual = float(np.median(seen)) if seen else size
     return LEAST * size < area < MOST * size and HALF_HIDDEN * usual < area < TOO_MUCH * usual
@@ -117,14 +117,14 @@ def _flag(picture: Picture, behind: Picture) -> str:
 
 
 def _copy(y: NDArray[np.uint8], last: NDArray[np.uint8], blob: Blob, path: Sequence[complex]) -> bool:
-    """Whether a frame repeats the last although the bob was moving."""
+    """Return True if a frame repeats the last although the bob was moving."""
     if len(path) < 3 or abs(2 * (path[-1] - path[-2]) - (path[-2] - path[-3])) < MOVED:
         return False  # it was about to stand still
     return is_copy(y, last, [blob.centre], int(1.5 * np.sqrt(blob.area)))
 
 
 def circle(points: NDArray[np.complex128]) -> Circle:
-    """The circle through points, least squares of the distances, outliers counting less."""
+    """Fit a circle through points by least squares of the distances; outliers count less."""
     from scipy.optimize import least_squares
 
     u, v = points.real - points.real.mean(), points.imag - points.imag.mean()

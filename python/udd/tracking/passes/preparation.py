@@ -152,13 +152,13 @@ def lens_estimates(bent: Bent, lens: Lens, wanted: Calibrate) -> dict[str, Estim
 
 
 def readout_estimate(readout: Readout, wanted: Calibrate) -> dict[str, Estimate]:
-    """The readout as a row of the table."""
+    """Return the readout as a row of the table."""
     how = "found" if readout.value else "none found"
     return {"readout": wanted.estimate("readout", readout.value, readout.sigma, how)}
 
 
 def exposure_estimate(exposure: Exposure, wanted: Calibrate) -> dict[str, Estimate]:
-    """The exposure as a row of the table."""
+    """Return the exposure as a row of the table."""
     how = "found" if exposure.value or np.isfinite(exposure.sigma) else "too slow to tell"
     return {"exposure": wanted.estimate("exposure", exposure.value, exposure.sigma, how)}
 
@@ -220,7 +220,7 @@ def _rim(
     view: NDArray[np.bool_],
     options: TrackOptions,
 ) -> Rim | None:
-    """The disk's outline; None if it does not show, then the marks say where its centre is."""
+    """Fit the disk's outline; None if it is not visible, and then the marks give the centre."""
     try:
         return outline(sharp, look, view, rim_span(options))
     except TrackError:
@@ -235,7 +235,7 @@ def _rim(
 
 
 def rim_span(options: TrackOptions) -> tuple[float, float]:
-    """Where to look for the rim, in units of the marks' reach."""
+    """Return the search range of the rim, in units of the marks' reach."""
     if options.layout.standard:
         return SPAN
     ratio = options.disk_radius / options.layout.reach
@@ -253,7 +253,7 @@ def _contact(in_motion: list[Moving], look: DiskAppearance) -> Contact | None:
 
 
 def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[complex, float]:
-    """A sight in the picture as a pose in the plane of the disk."""
+    """Return a sight in the picture as a pose in the plane of the disk."""
     arms = body * sight.reach * np.exp(1j * sight.angle)
     marks = lens.plane(sight.centre + arms)
     spread = arms - arms.mean()
@@ -273,7 +273,7 @@ def _centred(look: DiskAppearance, centre: complex, options: TrackOptions) -> Di
 
 
 def upward(places: NDArray[np.complex128], options: TrackOptions) -> complex:
-    """By what marks at `places` from the disk's centre are turned; of the standard ones red is at beta.
+    """Return the turn of marks at `places` from the disk's centre; of the standard ones red is at beta.
 
     If all four are at right angles within their errors, all four define beta, as do all the marks of any
     other layout. The first mark defines beta of a layout that is given with an error.

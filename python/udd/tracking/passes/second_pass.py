@@ -162,7 +162,7 @@ class LocalMotion:
         self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
 
     def _neighbours(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
-        """The nearest frames on both sides, how many intervals off, and whether k is tracked."""
+        """Return the nearest frames on both sides, their distances in intervals, and True if k is tracked."""
         place = int(np.searchsorted(self.good, k))
         tracked = place < len(self.good) and bool(self.good[place] == k)
         low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + tracked

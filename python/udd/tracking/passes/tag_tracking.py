@@ -122,7 +122,7 @@ def follow_tags(
 
 
 def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
-    """The body laid through points at any size: pose and size."""
+    """Fit the body through points at any size: pose and size."""
     ok = np.isfinite(at)
     centre, turn = laid(body[ok], at[ok])
     return Pose(centre, float(np.angle(turn))), abs(turn)

@@ -50,14 +50,14 @@ class Tracks:
 
     @classmethod
     def of(cls, frames: Sequence[FrameTrack]) -> Tracks:
-        """From its frames."""
+        """Make tracks from their frames."""
         columns: dict[str, Any] = {f.name: [getattr(frame, f.name) for frame in frames] for f in fields(cls)}
         texts = ("flag", "method")
         done: dict[str, Any] = {k: tuple(v) if k in texts else np.array(v) for k, v in columns.items()}
         return cls(**done)
 
     def __len__(self) -> int:
-        """How many frames."""
+        """Return the number of frames."""
         return len(self.t)
 
     @property
@@ -66,7 +66,7 @@ class Tracks:
         return np.asarray(np.isfinite(self.information).all(axis=(1, 2)))
 
     def without(self, those: NDArray[np.bool_], flag: str) -> Tracks:
-        """The same without the poses of some frames (n,), which get a flag if they have none."""
+        """Return tracks without the poses of some frames (n,), which get a flag if they have none."""
         changed = {
             k: lost_in(float(self.t[k]), flag, float(self.streak[k]), self.chi2.shape[1])
             for k in map(int, np.flatnonzero(those))
@@ -75,14 +75,14 @@ class Tracks:
         return self.with_frames(changed) if changed else self
 
     def with_frames(self, changed: Mapping[int, FrameTrack]) -> Tracks:
-        """The same with other frames at those numbers."""
+        """Return tracks with other frames at those numbers."""
         columns = {f.name: list(getattr(self, f.name)) for f in fields(self)}
         frames = [FrameTrack(*row) for row in zip(*columns.values(), strict=True)]
         return Tracks.of([changed.get(k, frame) for k, frame in enumerate(frames)])
 
 
 def found_in(t: float, fit: Fit, pose: Pose, streak: float, method: str) -> FrameTrack:
-    """A frame in which a fit holds the disk."""
+    """Return a frame in which a fit locates the disk."""
     return FrameTrack(
         t,
         pose.centre,
@@ -99,7 +99,7 @@ def found_in(t: float, fit: Fit, pose: Pose, streak: float, method: str) -> Fram
 
 
 def lost_in(t: float, flag: str, streak: float, marks: int) -> FrameTrack:
-    """A frame without a pose."""
+    """Return a frame without a pose."""
     return FrameTrack(
         t,
         complex(np.nan, np.nan),

@@ -72,7 +72,7 @@ def strains(tracks: Tracks, look: DiskAppearance) -> tuple[Array, Array]:
 
 
 def wobble(tracks: Tracks, look: DiskAppearance) -> Wobble:
-    r"""How much the disk wobbles, from how its marks are foreshortened.
+    r"""Estimate the wobble of the disk, from the foreshortening of its marks.
 
     Turned by a out of the picture's plane about an axis in it, the disk is seen shorter across that axis by
     1 - cos a. Its mean hides in scale and layout; of a sine of amplitude A, what varies has the variance
@@ -127,7 +127,7 @@ def _variances(strain: Array, axis: float) -> tuple[float, Array]:
 
 
 def _axis(strain: Array) -> float:
-    """The axis across which most varies."""
+    """Return the axis of the largest variation."""
     tried = np.pi * np.arange(AXES) / AXES
     return float(tried[np.argmax([_variances(strain, a)[0] for a in tried])])
 

@@ -41,7 +41,7 @@ class WobbleCorrection:
         return replace(self, tracks=tracks, look=replace(self.look, marks=marks))
 
     def look_at(self, k: int) -> DiskAppearance:
-        """The marks as frame k shows them: foreshortened."""
+        """Return the marks as frame k shows them: foreshortened."""
         turn = np.exp(1j * self.tracks.angle[k]) if self.tracked[k] else 1.0
         moved = (
             self.short[k]
@@ -53,7 +53,7 @@ class WobbleCorrection:
         return replace(self.look, marks=marks)
 
     def about(self, pivot: complex) -> tuple[Tracks, Array]:
-        """Where the centre would be too, and standard errors (n, 3) of u, v, beta, signed: of one cause.
+        """Return the corrected centre, and signed standard errors (n, 3) of u, v, beta with one cause.
 
         The wheels hold the disk at the contact, about which it is foreshortened.
         """
@@ -67,7 +67,7 @@ class WobbleCorrection:
 def correct_wobble(
     tracks: Tracks, look: DiskAppearance, turning: Wobble, before: WobbleCorrection | None = None
 ) -> WobbleCorrection | None:
-    """Each frame's foreshortening by what its pose left over; None where no frame shows all marks.
+    """Correct each frame's foreshortening by the residual of its pose; None if no frame shows all marks.
 
     The disk is not foreshortened along the axis of its turning: if the marks are further apart there than
     they were learned, the learned distances are too small by the same factor. And they were learned from
@@ -141,11 +141,11 @@ class _Frame:
         return cls(turn, arms, np.nan_to_num(tracks.residuals[k]).ravel(), weight, design, solved)
 
     def across(self, direction: complex) -> Complexes:
-        """How far a stretch of 1 in a direction moves the marks."""
+        """Return the displacement of the marks by a stretch of 1 in a direction."""
         return np.asarray((self.arms * np.conj(direction)).real * direction)
 
     def response(self, moved: Complexes) -> tuple[Array, Array]:
-        """The pose (u, v, beta) for displacements of the marks, and what of them it does not explain."""
+        """Return the pose (u, v, beta) for displacements of the marks, and the residual displacements."""
         value = np.column_stack([moved.real, moved.imag]).ravel()
         pose = self.solved @ value
         return pose, value - self.design @ pose
