@@ -164,7 +164,7 @@ def first_line_faults(source: str) -> list[str]:
 def test_first_lines_of_a_source_are_judged() -> None:
     assert first_line_faults('def f():\n    """The number of points."""\n') == ["1: The number of points."]
     assert first_line_faults('class A:\n    """How it moves."""\n') == ["1: How it moves."]
-    assert first_line_faults('"""Whether it moves."""\n') == ["1: Whether it moves."]
+    assert first_line_faults('"""Where it moves."""\n') == ["1: Where it moves."]
     assert first_line_faults('@property\ndef f():\n    """The number of points."""\n') == []
     assert first_line_faults('def f():\n    """Count the points."""\n') == []
 

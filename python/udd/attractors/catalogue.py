@@ -20,7 +20,7 @@ class AttractorCatalogue:
     attractors: list[Attractor] = field(default_factory=list)
 
     def places(self, crossings: Crossings, verdicts: Classification) -> NDArray[np.int32]:
-        """Return the place of each job's attractor, -1 if there is none; add new attractors."""
+        """Return the place of each job's attractor, or -1; add new attractors."""
         result = np.full(len(crossings.outcome), -1, dtype=np.int32)
         known = decided(crossings, verdicts)
         for period in np.unique(verdicts.period[known]).tolist():

@@ -159,7 +159,7 @@ def _locked(store: str | os.PathLike[str] | zarr.Group) -> Iterator[None]:
 
 
 def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, where: str) -> zarr.Group:
-    """Return the group of this sweep; make it if there is none."""
+    """Return the group of this sweep, and make it if it is absent."""
     import zarr
 
     if isinstance(store, zarr.Group):
