@@ -123,6 +123,10 @@ def scaled_lorenz(w: float, epsilon: float, b: float = 8 / 3) -> Model:
     With ``sigma = 1/epsilon`` and ``r = w sigma^2/b``, Lorenz's variables are ``x = sigma omega``,
     ``y = sigma y``, ``z = r - sigma z``, and his time runs sigma times slower. Nothing is neglected.
 
+    References
+    ----------
+    E. N. Lorenz, J. Atmos. Sci. 20 (1963) 130 [2]. The scaling: L. Maas [1].
+
     Examples
     --------
     >>> import udd
@@ -237,6 +241,10 @@ def pendulum(r: float, friction: float = 1.0, torque: float = 0.0) -> Model:
     Notes
     -----
     The DLE at w = 0 moves as ``y = -r sin(theta)``, ``z = -r cos(theta)``, ``omega = v``.
+
+    References
+    ----------
+    L. Maas [1].
 
     Examples
     --------

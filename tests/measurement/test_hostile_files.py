@@ -107,7 +107,7 @@ def test_groups_deep_within_each_other_are_refused(tmp_path: Path) -> None:
     start = time.perf_counter()
     with pytest.raises(MeasurementError, match="groups lie more than 32 deep"):
         read_measurement(path)
-    assert time.perf_counter() - start < 20  # it took 7 s on an idle machine, and 60 s with 3000
+    assert time.perf_counter() - start < 20  # it took 7 s on a free machine, and 60 s with 3000
 
 
 def test_a_group_that_holds_itself_is_read_once(tmp_path: Path) -> None:

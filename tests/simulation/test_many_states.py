@@ -1,4 +1,4 @@
-"""Models with up to twelve states, whose arrays hold idle components too."""
+"""Models with up to twelve states, whose arrays also have unused components."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Printed sheets: true to scale, and read by the tracker with the layout beside them."""
+"""Printed sheets: true to scale, and read by the tracker with the layout next to them."""
 
 from __future__ import annotations
 

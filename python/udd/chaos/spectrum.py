@@ -93,6 +93,10 @@ class Spectrum(Drawable):
     udd.lyapunov_spectrum : makes it.
     udd.plot.spectrum : draw one spectrum.
     udd.plot.exponents : draw several over a parameter.
+
+    References
+    ----------
+    Dimension: J. L. Kaplan and J. A. Yorke [21].
     """
 
     exponents: _Floats
@@ -439,6 +443,10 @@ class Covariant(Drawable, OneLine):
     --------
     udd.covariant_vectors : makes it.
     udd.plot.spectrum : draw the finite-time exponents.
+
+    References
+    ----------
+    F. Ginelli et al. [22].
     """
 
     t: _Floats

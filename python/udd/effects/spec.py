@@ -119,8 +119,8 @@ class Spec:
     treatments : tuple of str
         Treatments of dry friction's jump at rest, the default first. ``"smoothed"`` uses the width `eps`:
         nothing sticks, but it can be fitted. ``"set-valued"`` sticks until the torque exceeds the friction.
-        ``"karnopp"`` does the same, and speeds below `eps` count as rest. ``"lugre"`` has bristles that bend
-        by about `eps`, in rad, before they slide; their deflection is an additional state, for
+        ``"karnopp"`` [18] does the same, and speeds below `eps` count as rest. ``"lugre"`` [19] has bristles
+        that bend by about `eps`, in rad, before they slide. Their deflection is an additional state, for
         :func:`udd.simulate` only. Empty for effects other than dry friction.
     parameters : tuple of Parameter
         In the order of the formula.

@@ -329,9 +329,9 @@ def curve(
     -----
     The curve is ``sum of c[i] B((x - low)/h + 1 - i)`` with the cardinal cubic B-spline ``B`` and ``h = (high
     - low)/(n - 3)``. Every cubic spline with these knots from `low` to `high` has this form (C. de Boor, "A
-    Practical Guide to Splines", Springer 1978). A periodic curve has ``h = (high - low)/n`` and continues
-    with ``c[0]`` after ``c[n - 1]``. Second derivatives are continuous except at the ends of the curve. In
-    formulas it is ``spline(x, low, high, c0, c1, ...)`` and ``periodic(...)``.
+    Practical Guide to Splines", Springer 1978 [57]). A periodic curve has ``h = (high - low)/n`` and
+    continues with ``c[0]`` after ``c[n - 1]``. Second derivatives are continuous except at the ends of the
+    curve. In formulas it is ``spline(x, low, high, c0, c1, ...)`` and ``periodic(...)``.
 
     Examples
     --------

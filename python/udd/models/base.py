@@ -94,6 +94,11 @@ class Model:
     restart there; derivatives pass through, with a jump's saltation matrix. Runs cross further surfaces by
     small steps, and such a model has no power series.
 
+    References
+    ----------
+    Sliding on a switching surface: A. F. Filippov [16]. Saltation matrix: R. I. Leine and H. Nijmeijer [17].
+    Taylor series: À. Jorba and M. Zou [13].
+
     Examples
     --------
     >>> import udd

@@ -49,6 +49,10 @@ def driven_disk(
     udd.InputSignal : a measured signal.
     udd.plot.input_signal : draw the signal.
 
+    References
+    ----------
+    The disk: L. Maas [1].
+
     Examples
     --------
     >>> import udd

@@ -52,6 +52,10 @@ def whiteness(
     --------
     udd.fit : makes the fit.
     udd.plot.misfit : draw the misfits over time.
+
+    References
+    ----------
+    G. M. Ljung and G. E. P. Box, Biometrika 65 (1978) 297 [45].
     """
     require(innovations, "innovations (udd.discovery) have an autocorrelation", "autocorrelation")
     require_colour(colour)

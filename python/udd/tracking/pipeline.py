@@ -182,6 +182,10 @@ def track(
     The contact point comes from the rolling constraint dY/dT = Z Omega, dZ/dT = -Y Omega + W, with a drive of
     any constant velocity. This calibration assumes no slip, so it is no evidence about slip.
 
+    References
+    ----------
+    The rolling constraint: L. Maas [1].
+
     Examples
     --------
     >>> import udd
