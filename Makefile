@@ -35,7 +35,7 @@ endif
 # Sources of the compiled module; cargo decides which of them to compile again.
 SOURCES := $(shell find rust -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help install edit demo docs test test-rust test-python test-slow fuzz lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-fit bench-peers bench-states bench-crossings bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
+.PHONY: help install edit demo docs test test-rust test-python test-slow fuzz lint lint-rust lint-python format dist lock clean bench bench-count bench-startup bench-output bench-fit bench-peers bench-states bench-crossings bench-discovery bench-odebench bench-odebench-pysindy bench-tracker bench-page test-browser
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -106,6 +106,9 @@ bench-count: .venv/.made ## count their instructions; fails where one takes over
 bench-startup: .venv/.ready-user ## what importing udd takes in seconds, and a long sweep in memory
 	$(PY) benches/python/startup.py
 	$(PY) benches/python/memory.py
+
+bench-output: .venv/.ready-user ## seconds to the first output of each command of the docs (ARGS='"udd fit"' for some of them)
+	$(PY) benches/python/first_output.py $(ARGS)
 
 bench-fit: .venv/.ready-user ## what fits of simulated films take on one core (ARGS="--frames 3000 --turns 9")
 	$(PY) benches/python/fit.py $(ARGS)

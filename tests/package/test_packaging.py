@@ -44,3 +44,11 @@ def test_the_paper_cites_what_its_list_has() -> None:
     assert set(re.findall(r"\[@(\w+)\]", text)) == entries
     made = (ROOT / "paper" / "figures.py").read_text(encoding="utf-8")
     assert all(f'"{name}"' in made for name in re.findall(r"\]\((\w+\.png)\)", text))
+
+
+def test_the_release_checks_its_wheel_on_the_oldest_and_the_newest_python() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "release.yml").read_text(encoding="utf-8")
+    wheel = workflow.partition("  wheel:\n")[2].partition("  sdist:\n")[0]
+    oldest = re.search(r">=(3\.\d+)", PROJECT["requires-python"])
+    assert oldest is not None and f'"{oldest[1]}"' in wheel
+    assert '"3.14"' in wheel and "packaging/check_wheel.py" in wheel
