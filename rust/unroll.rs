@@ -21,16 +21,6 @@ macro_rules! unroll {
 }
 pub(crate) use unroll;
 
-/// The array `[element; D]` over a scalar `S`, where `element` may use the index.
-macro_rules! vector {
-    ($S:ty, $D:tt; $n:ident => $element:expr) => {{
-        let mut all = [<$S as $crate::scalar::Scalar>::zero(); $D];
-        $crate::unroll::unroll!($n in 0 .. $D => { all[$n] = $element; });
-        all
-    }};
-}
-pub(crate) use vector;
-
 /// Whether a loop from `FROM` below `COUNT`, at most `MOST`, reaches `K`.
 ///
 /// It does not depend on the types around the loop: a `const` block there would be evaluated, and kept, for each of the

@@ -28,6 +28,24 @@ LORENZ = udd.Model(
     {"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
     {"sigma": 10.0, "rho": 28.0, "beta": 8 / 3},
 )
+DISK = udd.Model(
+    ["Omega", "Y", "Z", "beta"],
+    {
+        "Omega": "(g*Y - max(k1 - k2*abs(Omega), k0)*Omega - W*Z*Omega)/(R^2/2 + Y^2 + Z^2)",
+        "Y": "Z*Omega",
+        "Z": "W - Y*Omega",
+        "beta": "Omega",
+    },
+    udd.Disk(0.039).parameters,
+)
+RUBBING = udd.Model(
+    ["x", "v"],
+    {
+        "x": "v",
+        "v": "cos(1.1*t) - x - x^2*x/4 - c*sign(v) - min(v, c)*where(x > 0.2, v^2, abs(x - 1)) + c*x*v",
+    },
+    {"c": 0.3},
+)
 SWING = udd.Model(["theta", "v"], {"theta": "v", "v": "-4*sin(theta) - tanh(v)/9 + cos(1.4*t)"}, {"F": 1.0})
 GRIPPING = udd.Disk(0.039, effects=[udd.effects.relaxation(b=6.0), udd.effects.quadratic_drag(c=0.01)])
 DRY = udd.Pendulum(0.5, effects=[udd.effects.coulomb(c=0.05, treatment="set-valued")])
@@ -42,6 +60,8 @@ RUNS = {
     "pendulum that sticks": (DRY, [0.0, 1.0]),
     "Lorenz as text": (LORENZ, [1, 1, 1]),
     "swing as text": (SWING, [0.5, 0.0]),
+    "disk as text": (DISK, [3.0, 0.005, 0.0, 0.0]),
+    "friction as text": (RUBBING, [0.5, 0.0]),
 }
 
 

@@ -12,8 +12,7 @@ use crate::analysis::trajectory::{Outcome, follow};
 use crate::integrate::{Failure, Integrator, Steps, Tolerance, order};
 use crate::model::{AnySystem, Family, System};
 use crate::observe::Samples;
-use crate::scalar::{Isa, Mask, Real, Scalar};
-use crate::unroll::vector;
+use crate::scalar::{Isa, Mask, Real, Scalar, vector};
 
 /// How steps are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

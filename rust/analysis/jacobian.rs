@@ -1,8 +1,7 @@
 //! The law's own derivatives at a state.
 
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Dual, Scalar, WIDTH, Wide, constants};
-use crate::unroll::vector;
+use crate::scalar::{Dual, Scalar, WIDTH, Wide, constants, vector};
 
 /// The rates at a state and their first derivatives.
 #[derive(Clone, Debug)]

@@ -7,9 +7,8 @@ use crate::integrate::{
     order,
 };
 use crate::model::{AnySystem, Family, System};
-use crate::scalar::{Dual, Isa, Scalar, constants};
+use crate::scalar::{Dual, Isa, Scalar, constants, vector};
 use crate::tape::Tape;
-use crate::unroll::vector;
 
 /// So many parameters can be differentiated by at once.
 pub const MOST_PARAMETERS: usize = 2;

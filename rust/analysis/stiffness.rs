@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::integrate::{Failure, Steps};
-use crate::unroll::vector;
+use crate::scalar::vector;
 
 /// The run is looked at after so many steps.
 const EVERY: u64 = 1000;

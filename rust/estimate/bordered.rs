@@ -5,8 +5,7 @@ use nalgebra::{ArrayStorage, DMatrix, DVector, SMatrix, SVector};
 use super::row_matrix::{OuterProductSum, RowMatrix, add, combine, dot, padded};
 use super::{EstimateError, Linearisation, ParameterJacobian, Record};
 use crate::integrate::cancel;
-use crate::scalar::{InstructionSet, Isa, Real, Work};
-use crate::unroll::vector;
+use crate::scalar::{InstructionSet, Isa, Real, Work, vector};
 
 /// Whether the work is to end is asked once for so many frames.
 const LOOKS: usize = 1024;

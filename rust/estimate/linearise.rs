@@ -15,8 +15,7 @@ use super::sensor::{Moment, rates, see_late};
 use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Sensor, Unknowns};
 use crate::analysis::batch::parallel::in_parts;
 use crate::model::{Family, System};
-use crate::scalar::{InstructionSet, Isa, Scalar, Work, constants, run_with};
-use crate::unroll::vector;
+use crate::scalar::{InstructionSet, Isa, Scalar, Work, constants, run_with, vector};
 
 /// Frames are looked at by so many at least: each takes about a microsecond.
 const TOGETHER: usize = 16;

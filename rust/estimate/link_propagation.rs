@@ -6,9 +6,8 @@ use super::{EstimateError, Estimator, Role, Sensor, Unknowns};
 use crate::analysis::batch::parallel::try_in_parts;
 use crate::integrate::{ErrorNorm, Failure, Integrator, MaybeTangents, Method, Taylor, Tolerance, order};
 use crate::model::{AnySystem, Family, System};
-use crate::scalar::{Dual, Isa, Scalar, Wide};
+use crate::scalar::{Dual, Isa, Scalar, Wide, vector};
 use crate::tape::Tape;
-use crate::unroll::vector;
 
 /// A link takes a few steps. If a fit diverges, for example near a formula's pole, it would take very many, and the
 /// fit should turn back at once.

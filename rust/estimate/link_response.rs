@@ -10,7 +10,7 @@ use super::parameter_jacobian::{WIDTH, Wide, rates_of};
 use super::{EstimateError, Estimator, Sensor, Unknowns};
 use crate::inverse::invert;
 use crate::model::Family;
-use crate::unroll::vector;
+use crate::scalar::vector;
 
 /// Places within a link, as parts of its time, and their weights (Gauss-Legendre).
 const PLACES: [f64; PLACES_PER_LINK] = [0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7];

@@ -10,9 +10,8 @@ use super::{EstimateError, Estimator, FilmParameters, FreeParameter, Role, Senso
 use crate::analysis::batch::parallel::in_parts;
 use crate::integrate::propagate;
 use crate::model::{Family, System, sides_of};
-use crate::scalar::{Scalar, constants};
+use crate::scalar::{Scalar, constants, vector};
 pub(super) use crate::scalar::{WIDTH, Wide};
-use crate::unroll::vector;
 
 /// Blocks of rows are worked on by so many at least.
 const TOGETHER: usize = 16;

@@ -2,8 +2,7 @@
 
 use crate::integrate::{Tolerance, propagate};
 use crate::model::{FormulaFamily, Observation, System, sides_of};
-use crate::scalar::Scalar;
-use crate::unroll::vector;
+use crate::scalar::{Scalar, vector};
 
 /// A state as a sensor meets it: when, how it changes, and the parameters of its law.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use super::{Binary, Expression, Leaf, Op, Unary};
-use crate::model::MAX_SURFACES;
-use crate::scalar::Scalar;
+use crate::sides::MAX_SURFACES;
 
 /// A function that is smooth on each side of the zeros of a surface's function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,19 +51,6 @@ impl Kink {
     /// Whether its value jumps at the surface.
     fn jumps(self) -> bool {
         matches!(self, Kink::Sign | Kink::Where)
-    }
-
-    /// Its value on the positive side of the surface where `side` is true, else on the other.
-    #[inline(always)]
-    pub fn on<S: Scalar>(self, side: S::Mask, of: &[S]) -> S {
-        match self {
-            Kink::Abs => S::select(side, of[0], -of[0]),
-            Kink::Sign => S::select(side, S::one(), -S::one()),
-            // The surface is where the first number is the second.
-            Kink::Min => S::select(side, of[1], of[0]),
-            Kink::Max => S::select(side, of[0], of[1]),
-            Kink::Where => S::select(side, of[1], of[2]),
-        }
     }
 }
 

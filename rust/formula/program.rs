@@ -5,8 +5,8 @@
 use std::collections::HashMap;
 
 use super::{Binary, Expression, Kink, Leaf, Op, Spline, Unary};
-use crate::model::{MAX_SURFACES, Sides};
 use crate::scalar::Scalar;
+use crate::sides::{MAX_SURFACES, Sides};
 
 /// Where formulas are evaluated.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct Place<'a, S> {
     pub inputs: &'a [S],
 }
 
-/// The effect of an operation on the registers `a`, `b` and `c`.
+/// The effect of an operation on its registers `a`, `b`, `c` and `d`. Each operation of the text is rounded by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Action {
     Add,
@@ -27,16 +27,31 @@ enum Action {
     Div,
     Neg,
     Square,
-    /// `a b + c`, rounded twice.
+    /// `a b c`
+    MulMul,
+    /// `a b + c`
     MulAdd,
     /// `a b - c`
     MulSub,
     /// `c - a b`
     SubMul,
+    /// `d - a b c`
+    SubMulMul,
+    /// `a b + c d`
+    MulAddMul,
+    /// `a b - c d`
+    MulSubMul,
+    /// `a^2 + b`
+    SquareAdd,
     Unary(Unary),
     Binary(Binary),
     Where,
-    On(Kink, u8),
+    /// `a` on the positive side of this surface, else `b`.
+    Select(u8),
+    /// `a` on the positive side of this surface, else `-a`.
+    Turn(u8),
+    /// 1 on the positive side of this surface, else -1.
+    Sign(u8),
     /// By its number; its coefficients are in the registers from `b` on.
     Spline(u16),
 }
@@ -45,7 +60,7 @@ enum Action {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     action: Action,
-    of: [u16; 3],
+    of: [u16; 4],
     to: u16,
 }
 
@@ -69,18 +84,46 @@ pub struct Program {
     /// How many of them the parameters determine: they are the last ones.
     constants: usize,
     splines: Vec<Spline>,
-    /// What these determine.
+    /// Operations on parameters and numbers alone. Their registers hold nothing else.
     first: Vec<Step>,
-    /// The registers that the other steps, or the results, take of the constants and of what these determine.
-    fixed: Vec<u16>,
     steps: Vec<Step>,
     results: Vec<u16>,
     registers: usize,
 }
 
-/// Registers of most programs, and of the larger ones; the room of any others is allocated.
-const FEW: usize = 24;
-const MANY: usize = 96;
+/// The numbers of registers that programs have room for without an allocation: powers of two.
+const ROOMS: [usize; 4] = [8, 16, 32, 64];
+
+/// The registers of a program.
+trait Room<S> {
+    fn at(&self, register: u16) -> S;
+    fn put(&mut self, register: u16, value: S);
+}
+
+/// A program has as many registers, or fewer: the remainder is the number itself, and the compiler need not check it.
+impl<S: Scalar, const R: usize> Room<S> for [S; R] {
+    #[inline(always)]
+    fn at(&self, register: u16) -> S {
+        self[usize::from(register) % R]
+    }
+
+    #[inline(always)]
+    fn put(&mut self, register: u16, value: S) {
+        self[usize::from(register) % R] = value;
+    }
+}
+
+impl<S: Scalar> Room<S> for [S] {
+    #[inline(always)]
+    fn at(&self, register: u16) -> S {
+        self[usize::from(register)]
+    }
+
+    #[inline(always)]
+    fn put(&mut self, register: u16, value: S) {
+        self[usize::from(register)] = value;
+    }
+}
 
 impl Program {
     /// For these formulas.
@@ -105,17 +148,15 @@ impl Program {
         self.leaves.iter().any(|leaf| matches!(leaf, Leaf::Rate(_)))
     }
 
-    /// Computes the values that depend on parameters alone, for [`run`](Program::run).
+    /// Computes the values that depend on parameters alone, for [`run`](Program::run): all registers as a run begins with
+    /// them.
     ///
     /// # Panics
     /// If there are fewer parameters than the formulas take.
     pub fn fix<S: Scalar>(&self, parameters: &[S]) -> Vec<S> {
-        if self.fixed.is_empty() {
-            return Vec::new();
-        }
-        let mut work = vec![S::zero(); self.registers];
+        let mut work = vec![S::zero(); self.room()];
         self.determine(&|i| parameters[i], &mut work);
-        self.fixed.iter().map(|&at| work[usize::from(at)]).collect()
+        work
     }
 
     /// The results at a place, after [`fix`](Program::fix), with [kinks](super::Kinks) taken on these sides.
@@ -124,13 +165,27 @@ impl Program {
     /// If the place lacks what the formulas take, or the results have no room.
     #[inline(always)]
     pub fn run<S: Scalar>(&self, place: &Place<'_, S>, fixed: &[S], sides: &Sides<S>, results: &mut [S]) {
-        let work = |work: &mut [S], results: &mut [S]| {
-            for (&at, &value) in self.fixed.iter().zip(fixed) {
-                work[usize::from(at)] = value;
-            }
-            self.follow(place, sides, work, results);
-        };
-        self.in_room(work, results);
+        // Most surfaces are a component of the state.
+        if let &[at] = &self.results[..]
+            && usize::from(at) < self.states
+        {
+            results[0] = place.x[usize::from(at)];
+            return;
+        }
+        // Plain numbers are dispatched faster than their registers are checked.
+        macro_rules! follow_in {
+            ($($k:literal)+) => {
+                $(if let Ok(fixed) = <&[S; ROOMS[$k]]>::try_from(fixed) {
+                    let mut work = *fixed;
+                    return match const { size_of::<S>() == size_of::<f64>() } {
+                        true => self.follow(place, sides, &mut work, results),
+                        false => self.follow(place, sides, &mut work[..], results),
+                    };
+                })+
+            };
+        }
+        follow_in!(0 1 2 3);
+        self.follow(place, sides, &mut fixed.to_vec()[..], results);
     }
 
     /// The same with these parameters.
@@ -164,23 +219,20 @@ impl Program {
         sides: &Sides<S>,
         results: &mut [S],
     ) {
-        let work = |work: &mut [S], results: &mut [S]| {
+        let mut work = |work: &mut [S]| {
             self.determine(parameter, work);
             self.follow(place, sides, work, results);
         };
-        self.in_room(work, results);
+        match self.room() {
+            room if room <= ROOMS[1] => work(&mut [S::zero(); ROOMS[1]]),
+            room if room <= ROOMS[3] => work(&mut [S::zero(); ROOMS[3]]),
+            room => work(&mut vec![S::zero(); room]),
+        }
     }
 
-    /// Does work with the registers.
-    #[inline(always)]
-    fn in_room<S: Scalar>(&self, work: impl Fn(&mut [S], &mut [S]), results: &mut [S]) {
-        if self.registers <= FEW {
-            work(&mut [S::zero(); FEW], results);
-        } else if self.registers <= MANY {
-            work(&mut [S::zero(); MANY], results);
-        } else {
-            work(&mut vec![S::zero(); self.registers], results);
-        }
+    /// The number of registers that it runs with.
+    fn room(&self) -> usize {
+        ROOMS.into_iter().find(|&room| self.registers <= room).unwrap_or(self.registers)
     }
 
     /// Evaluates what only parameters determine.
@@ -198,49 +250,72 @@ impl Program {
     }
 
     /// Evaluates the rest.
+    // One function for each kind of number and of room: its loop is large.
     #[inline(never)]
-    fn follow<S: Scalar>(&self, place: &Place<'_, S>, sides: &Sides<S>, work: &mut [S], results: &mut [S]) {
-        work[..self.states].copy_from_slice(&place.x[..self.states]);
-        let leaves = &self.leaves[..self.leaves.len() - self.constants];
-        for (work, leaf) in work[self.states..].iter_mut().zip(leaves) {
+    fn follow<S: Scalar, W: Room<S> + ?Sized>(
+        &self,
+        place: &Place<'_, S>,
+        sides: &Sides<S>,
+        work: &mut W,
+        results: &mut [S],
+    ) {
+        let mut next = 0;
+        for &component in &place.x[..self.states] {
+            work.put(next, component);
+            next += 1;
+        }
+        for leaf in &self.leaves[..self.leaves.len() - self.constants] {
             match *leaf {
-                Leaf::Time => *work = place.t,
-                Leaf::Rate(n) => *work = place.rates[n],
-                Leaf::Input(k) => *work = place.inputs[k],
+                Leaf::Time => work.put(next, place.t),
+                Leaf::Rate(n) => work.put(next, place.rates[n]),
+                Leaf::Input(k) => work.put(next, place.inputs[k]),
                 Leaf::State(_) | Leaf::Number(_) | Leaf::Parameter(_) => {}
             }
+            next += 1;
         }
         self.perform(&self.steps, sides, work);
         for (result, &at) in results.iter_mut().zip(&self.results) {
-            *result = work[usize::from(at)];
+            *result = work.at(at);
         }
     }
 
     /// Does the steps one after the other.
-    // One function for each kind of number: its loop is large.
-    #[inline(never)]
-    fn perform<S: Scalar>(&self, steps: &[Step], sides: &Sides<S>, work: &mut [S]) {
+    #[inline(always)]
+    fn perform<S: Scalar, W: Room<S> + ?Sized>(&self, steps: &[Step], sides: &Sides<S>, work: &mut W) {
         for step in steps {
-            let [a, b, c] = step.of.map(usize::from);
-            work[usize::from(step.to)] = match step.action {
-                Action::Add => work[a] + work[b],
-                Action::Sub => work[a] - work[b],
-                Action::Mul => work[a] * work[b],
-                Action::Div => work[a] / work[b],
-                Action::Neg => -work[a],
-                Action::Square => work[a].square(),
-                Action::MulAdd => work[a] * work[b] + work[c],
-                Action::MulSub => work[a] * work[b] - work[c],
-                Action::SubMul => work[c] - work[a] * work[b],
-                Action::Unary(function) => function.of(work[a]),
-                Action::Binary(function) => function.of(work[a], work[b]),
-                Action::Where => S::jumping(S::zero().less(work[a]), work[b], work[c]),
-                Action::On(kink, side) => kink.on(sides[usize::from(side)], &[work[a], work[b], work[c]]),
+            let [a, b, c, d] = step.of;
+            macro_rules! of {
+                ($register:ident) => {
+                    work.at($register)
+                };
+            }
+            let value = match step.action {
+                Action::Add => of!(a) + of!(b),
+                Action::Sub => of!(a) - of!(b),
+                Action::Mul => of!(a) * of!(b),
+                Action::Div => of!(a) / of!(b),
+                Action::Neg => -of!(a),
+                Action::Square => of!(a).square(),
+                Action::MulMul => of!(a) * of!(b) * of!(c),
+                Action::MulAdd => of!(a) * of!(b) + of!(c),
+                Action::MulSub => of!(a) * of!(b) - of!(c),
+                Action::SubMul => of!(c) - of!(a) * of!(b),
+                Action::SubMulMul => of!(d) - of!(a) * of!(b) * of!(c),
+                Action::MulAddMul => of!(a) * of!(b) + of!(c) * of!(d),
+                Action::MulSubMul => of!(a) * of!(b) - of!(c) * of!(d),
+                Action::SquareAdd => of!(a).square() + of!(b),
+                Action::Unary(function) => function.of(of!(a)),
+                Action::Binary(function) => function.of(of!(a), of!(b)),
+                Action::Where => S::jumping(S::zero().less(of!(a)), of!(b), of!(c)),
+                Action::Select(side) => S::select(sides[usize::from(side)], of!(a), of!(b)),
+                Action::Turn(side) => S::select(sides[usize::from(side)], of!(a), -of!(a)),
+                Action::Sign(side) => S::select(sides[usize::from(side)], S::one(), -S::one()),
                 Action::Spline(own) => {
                     let spline = self.splines[usize::from(own)];
-                    spline.of(work[a], &|i| work[b + i - spline.first])
+                    spline.of(of!(a), &|i| work.at(b + register(i - spline.first)))
                 }
             };
+            work.put(step.to, value);
         }
     }
 }
@@ -344,10 +419,53 @@ impl Graph {
         uses
     }
 
-    /// A product that only this sum or difference needs.
+    /// The factors of a product that only one value needs.
     fn product(&self, uses: &[usize], i: usize) -> Option<[usize; 2]> {
         let Made { op, of: [a, b, _], fixed } = self.made[i];
         (op == Op::Binary(Binary::Mul) && uses[i] == 1 && !fixed).then_some([a, b])
+    }
+
+    /// The root of a square that only one value needs.
+    fn square(&self, uses: &[usize], i: usize) -> Option<usize> {
+        let Made { op, of: [a, ..], fixed } = self.made[i];
+        (op == Op::Unary(Unary::Power(2)) && uses[i] == 1 && !fixed).then_some(a)
+    }
+
+    /// The action of a sum, difference or product together with the values that nothing else needs, and these.
+    fn fused(&self, uses: &[usize], i: usize) -> Option<(Action, [usize; 4], Vec<usize>)> {
+        let Made { op, of: [a, b, _], fixed } = self.made[i];
+        if fixed {
+            return None;
+        }
+        let product = |i: usize| self.product(uses, i);
+        let square = |i: usize| self.square(uses, i);
+        let fused = match op {
+            Op::Binary(Binary::Add) => match (product(a), product(b)) {
+                (Some([f, g]), Some([h, k])) => (Action::MulAddMul, [f, g, h, k], vec![a, b]),
+                (Some([f, g]), None) => (Action::MulAdd, [f, g, b, b], vec![a]),
+                (None, Some([f, g])) => (Action::MulAdd, [f, g, a, a], vec![b]),
+                (None, None) => match (square(a), square(b)) {
+                    (_, Some(f)) => (Action::SquareAdd, [f, a, a, a], vec![b]),
+                    (Some(f), None) => (Action::SquareAdd, [f, b, b, b], vec![a]),
+                    (None, None) => return None,
+                },
+            },
+            Op::Binary(Binary::Sub) => match (product(a), product(b)) {
+                (Some([f, g]), Some([h, k])) => (Action::MulSubMul, [f, g, h, k], vec![a, b]),
+                (Some([f, g]), None) => (Action::MulSub, [f, g, b, b], vec![a]),
+                (None, Some([f, g])) => match product(f) {
+                    Some([h, k]) => (Action::SubMulMul, [h, k, g, a], vec![b, f]),
+                    None => (Action::SubMul, [f, g, a, a], vec![b]),
+                },
+                (None, None) => return None,
+            },
+            Op::Binary(Binary::Mul) => {
+                let [f, g] = product(a)?;
+                (Action::MulMul, [f, g, b, b], vec![a])
+            }
+            _ => return None,
+        };
+        Some(fused)
     }
 
     fn lower(&self, results: &[usize]) -> Program {
@@ -355,33 +473,20 @@ impl Graph {
         let is_leaf = |i: usize| matches!(self.made[i].op, Op::Push(_));
         let live: Vec<usize> = (0..self.made.len()).filter(|&i| uses[i] > 0).collect();
         let mut registers = Registers::new(self, live.iter().copied().filter(|&i| is_leaf(i)));
-        let mut parts: [Vec<(usize, Action, [usize; 3])>; 2] = Default::default();
+        let mut parts: [Vec<(usize, Action, [usize; 4])>; 2] = Default::default();
         let mut absorbed = vec![false; self.made.len()];
         for i in live.into_iter().rev().filter(|&i| !is_leaf(i)) {
             if absorbed[i] {
                 continue;
             }
             let Made { op, of, fixed } = self.made[i];
-            let [a, b, _] = of;
-            let (action, of) = match op {
-                Op::Binary(Binary::Add) if !fixed => match (self.product(&uses, a), self.product(&uses, b)) {
-                    (Some([f, g]), _) => (Action::MulAdd, [f, g, b]),
-                    (None, Some([f, g])) => (Action::MulAdd, [f, g, a]),
-                    (None, None) => (Action::Add, of),
-                },
-                Op::Binary(Binary::Sub) if !fixed => match (self.product(&uses, a), self.product(&uses, b)) {
-                    (_, Some([f, g])) => (Action::SubMul, [f, g, a]),
-                    (Some([f, g]), None) => (Action::MulSub, [f, g, b]),
-                    (None, None) => (Action::Sub, of),
-                },
-                op => (registers.action(op), of),
+            let (action, of) = match self.fused(&uses, i) {
+                Some((action, of, parts)) => {
+                    parts.into_iter().for_each(|part| absorbed[part] = true);
+                    (action, of)
+                }
+                None => registers.action(op, of),
             };
-            match action {
-                Action::SubMul => absorbed[b] = true,
-                Action::MulSub => absorbed[a] = true,
-                Action::MulAdd => absorbed[if of[2] == b { a } else { b }] = true,
-                _ => {}
-            }
             parts[usize::from(!fixed)].push((i, action, of));
         }
         parts.iter_mut().for_each(|part| part.reverse());
@@ -390,13 +495,15 @@ impl Graph {
 }
 
 impl Action {
-    /// The operands whose registers are read.
-    fn reads(self) -> std::ops::Range<usize> {
+    /// The number of operands whose registers are read.
+    fn reads(self) -> usize {
         match self {
-            Action::Neg | Action::Square | Action::Unary(_) | Action::Spline(_) => 0..1,
-            Action::Add | Action::Sub | Action::Mul | Action::Div | Action::Binary(_) => 0..2,
-            Action::MulAdd | Action::MulSub | Action::SubMul | Action::Where => 0..3,
-            Action::On(kink, side) => needed(Op::On(kink, side)),
+            Action::Sign(_) => 0,
+            Action::Neg | Action::Square | Action::Unary(_) | Action::Turn(_) | Action::Spline(_) => 1,
+            Action::Add | Action::Sub | Action::Mul | Action::Div | Action::Binary(_) => 2,
+            Action::SquareAdd | Action::Select(_) => 2,
+            Action::MulMul | Action::MulAdd | Action::MulSub | Action::SubMul | Action::Where => 3,
+            Action::SubMulMul | Action::MulAddMul | Action::MulSubMul => 4,
         }
     }
 }
@@ -437,8 +544,9 @@ impl<'a> Registers<'a> {
         Self { graph, states, leaves, constants, splines: Vec::new(), of, free: Vec::new(), count }
     }
 
-    fn action(&mut self, op: Op) -> Action {
-        match op {
+    /// The action of an operation by itself, and its operands.
+    fn action(&mut self, op: Op, [a, b, c]: [usize; 3]) -> (Action, [usize; 4]) {
+        let action = match op {
             Op::Push(_) => unreachable!("leaves have registers"),
             Op::Unary(Unary::Neg) => Action::Neg,
             Op::Unary(Unary::Power(2)) => Action::Square,
@@ -453,37 +561,31 @@ impl<'a> Registers<'a> {
                 Action::Spline(register(self.splines.len() - 1))
             }
             Op::Where => Action::Where,
-            Op::On(kink, side) => Action::On(kink, side),
-        }
+            Op::On(Kink::Abs, side) => Action::Turn(side),
+            Op::On(Kink::Sign, side) => Action::Sign(side),
+            Op::On(Kink::Max, side) => Action::Select(side),
+            // The surface is where the first number is the second.
+            Op::On(Kink::Min, side) => return (Action::Select(side), [b, a, a, a]),
+            // The side says what the condition is.
+            Op::On(Kink::Where, side) => return (Action::Select(side), [b, c, c, c]),
+        };
+        (action, [a, b, c, c])
     }
 
-    fn program(mut self, [first, rest]: [Vec<(usize, Action, [usize; 3])>; 2], results: &[usize]) -> Program {
+    fn program(mut self, [first, rest]: [Vec<(usize, Action, [usize; 4])>; 2], results: &[usize]) -> Program {
         // The last use of each value. Values of parameters alone stay, so that the steps can be repeated.
         let mut last = vec![None; self.graph.made.len()];
-        let mut fixed: Vec<usize> = Vec::new();
-        let mut reads = |i: usize| {
-            if self.graph.made[i].fixed && !fixed.contains(&i) {
-                fixed.push(i);
-            }
-        };
         for (at, (_, action, of)) in rest.iter().enumerate() {
-            for k in action.reads() {
-                last[of[k]] = Some(at);
-                reads(of[k]);
-            }
-            if let Action::Spline(own) = action {
-                (0..self.splines[usize::from(*own)].count).for_each(|k| reads(of[1] + k));
-            }
+            of[..action.reads()].iter().for_each(|&i| last[i] = Some(at));
         }
-        results.iter().for_each(|&i| reads(i));
         let made = &self.graph.made;
         let first: Vec<Step> = first.iter().map(|&(i, action, of)| self.step(i, action, of)).collect();
         let mut steps = Vec::with_capacity(rest.len());
         for (at, &(i, action, of)) in rest.iter().enumerate() {
             let operands = of.map(|k| self.of[k]);
-            for k in action.reads() {
-                let done = last[of[k]] == Some(at) && !made[of[k]].fixed && !results.contains(&of[k]);
-                let own = self.of[of[k]];
+            for &i in &of[..action.reads()] {
+                let done = last[i] == Some(at) && !made[i].fixed && !results.contains(&i);
+                let own = self.of[i];
                 if done && usize::from(own) >= self.states + self.leaves.len() && !self.free.contains(&own) {
                     self.free.push(own);
                 }
@@ -494,7 +596,6 @@ impl<'a> Registers<'a> {
         }
         let at = |list: &[usize]| list.iter().map(|&i| self.of[i]).collect();
         Program {
-            fixed: at(&fixed),
             results: at(results),
             states: self.states,
             leaves: self.leaves,
@@ -507,7 +608,7 @@ impl<'a> Registers<'a> {
     }
 
     /// A step whose result has a register of its own.
-    fn step(&mut self, i: usize, action: Action, of: [usize; 3]) -> Step {
+    fn step(&mut self, i: usize, action: Action, of: [usize; 4]) -> Step {
         let of = of.map(|k| self.of[k]);
         let to = self.free.pop().unwrap_or_else(|| {
             self.count += 1;
@@ -561,14 +662,14 @@ mod tests {
     fn registers_are_used_again() {
         let long = (0..60).map(|i| format!("(x + {i})*(y - {i})")).collect::<Vec<_>>().join(" - ");
         let sum = program(&[&long]);
-        assert!(sum.registers < 2 + 60 + 4, "{}", sum.registers);
+        assert!(sum.registers < 2 + 60 + 5, "{}", sum.registers);
         let wanted = (1..60).fold(-6.0, |all, i| all - (2.0 + f64::from(i)) * (-3.0 - f64::from(i)));
         assert_eq!(values(&sum, [0.0, 0.0]), [wanted]);
         // More than there is room for without an allocation.
         let open = format!("{}x{}", "1 + (y*".repeat(90), ")".repeat(90));
         let many = (0..90).map(|i| format!("sin(x + {i}.5)")).collect::<Vec<_>>().join("*(1 + ");
         let many = program(&[&format!("{many}{}", ")".repeat(89)), &open]);
-        assert!(many.registers > MANY && values(&many, [0.0, 0.0]).iter().all(|value| value.is_finite()));
+        assert!(many.registers > ROOMS[3] && values(&many, [0.0, 0.0]).iter().all(|value| value.is_finite()));
     }
 
     #[test]

@@ -10,17 +10,15 @@
 use std::cell::Cell;
 
 use super::cancel;
-use super::method::{Course, MOST_PROBES, Method, StepStart};
+use super::method::{Course, Method};
 use super::root::bracketed;
-use super::tolerance::Tolerance;
 use super::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes, time};
-use crate::model::{EnclosedSurfaces, MAX_SURFACES, Sides, System, choose};
-use crate::scalar::{Enclosed, Mask, Real, Scalar};
-use crate::unroll::{unroll, vector};
-
-/// The targets of crossings: the switching surfaces, then the wall.
-pub const TARGETS: usize = MAX_SURFACES + 1;
-pub const WALL: usize = MAX_SURFACES;
+use crate::model::{
+    EnclosedSurfaces, MOST_PROBES, Probes, Sides, StepStart, System, TARGETS, Targets, WALL, choose,
+};
+use crate::scalar::{Enclosed, Mask, Real, Scalar, vector};
+use crate::tolerance::Tolerance;
+use crate::unroll::unroll;
 
 /// The lanes of any target. Unrolled by hand: a fold stays a function without vector instructions.
 #[inline(always)]
@@ -35,10 +33,6 @@ const ZERO: f64 = 1e-13;
 const ON_TARGET: f64 = 1e-12;
 /// Below this a surface's function is rounding noise: the system rests on the surface.
 const NOISE: f64 = 1e-14;
-/// A function has no zero between two places if its bend, times this, is less than the sum of the two values.
-const CLEAR_SUM: f64 = 4.0;
-/// A function has no zero in a step if its bend between quarters, times this, is less than its values near both ends.
-const CLEAR: f64 = 1.5;
 /// A step with more pieces to look at is cut where they end.
 const MOST_PIECES: usize = 1 << 16;
 /// After each so many pieces the search asks whether its result is still wanted.
@@ -53,55 +47,6 @@ const DEPTHS: usize = 16;
 pub struct Look<S: Scalar, const D: usize> {
     probes: [[S::Real; D]; MOST_PROBES],
     pub suspect: [S::Mask; TARGETS],
-}
-
-/// The states at these parts of a step of size `h`.
-pub struct Probes<'a, R: Real, const D: usize> {
-    h: R,
-    parts: &'static [f64],
-    states: &'a [[R; D]; MOST_PROBES],
-}
-
-/// Finds the lanes that may cross each target: those beyond it at any of these places, and those that the places leave in
-/// doubt. A function of its own for each law and kind of number, whatever the method.
-#[inline(never)]
-pub fn suspect<M: System<S, D>, S: Scalar, const D: usize>(
-    system: &M,
-    at: &StepStart<S, D>,
-    wall: bool,
-    probes: &Probes<'_, S::Real, D>,
-    suspect: &mut [S::Mask; TARGETS],
-) {
-    // Where there is no target this is not asked.
-    if const { M::SMOOTH } {
-        return;
-    }
-    let watch = SurfaceMonitor { system, at, wall, noise: NOISE, rtol: 0.0 };
-    // The numbers of places, quarters or eighths, known to the compiler, which looks at them side by side.
-    match probes.parts.len() {
-        4 if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(4, probes, suspect),
-        _ if const { size_of::<S>() == size_of::<f64>() } => watch.at_places(MOST_PROBES, probes, suspect),
-        places => watch.at_places(places, probes, suspect),
-    }
-}
-
-/// The same, one target and one place after the other: for laws whose surfaces are long to ask for.
-pub fn suspect_in_turn<M: System<S, D>, S: Scalar, const D: usize>(
-    system: &M,
-    at: &StepStart<S, D>,
-    wall: bool,
-    probes: &Probes<'_, S::Real, D>,
-    suspect: &mut [S::Mask; TARGETS],
-) {
-    if const { M::SMOOTH } {
-        return;
-    }
-    let watch = SurfaceMonitor { system, at, wall, noise: NOISE, rtol: 0.0 };
-    for (target, suspect) in suspect.iter_mut().enumerate() {
-        if watch.has(target) {
-            *suspect = watch.at_target(target, probes.parts.len(), probes);
-        }
-    }
 }
 
 /// The effect of a step on the targets, lane by lane.
@@ -123,9 +68,7 @@ pub struct Found<R: Real> {
 
 /// A run on the way from one step to the next: what is looked at, and from where.
 pub struct SurfaceMonitor<'a, M, S: Scalar, const D: usize> {
-    system: &'a M,
-    at: &'a StepStart<S, D>,
-    wall: bool,
+    pub targets: Targets<'a, M, S, D>,
     /// A surface whose function stays below this in a step is left alone: the step's error is larger.
     noise: f64,
     /// The relative error of a step.
@@ -140,40 +83,25 @@ where
     /// From here on, with or without a wall.
     #[inline(always)]
     pub fn new(system: &'a M, at: &'a StepStart<S, D>, wall: bool, tolerance: &Tolerance) -> Self {
-        Self { system, at, wall, noise: NOISE.max(tolerance.atol), rtol: tolerance.rtol }
+        let targets = Targets { system, at, wall };
+        Self { targets, noise: NOISE.max(tolerance.atol), rtol: tolerance.rtol }
     }
 
-    /// Whether there is such a target.
-    #[inline(always)]
-    pub fn has(&self, target: usize) -> bool {
-        target < self.system.surfaces() || target == WALL && self.wall
-    }
-
-    /// The target's function, positive on the side that the law is frozen on.
-    #[inline(always)]
-    pub fn value(&self, target: usize, t: S::Real, x: &[S; D]) -> S::Real {
-        if target == WALL {
-            return self.system.wall(x).map_or(S::Real::one(), S::real);
-        }
-        let value = self.system.surface(target, S::lift(t), x, &self.at.sides).real();
-        S::Real::select(self.at.sides[target], value, -value)
-    }
-
-    /// The same at `dt` after the start of the method's last trial, on its polynomial.
+    /// The target's function at `dt` after the start of the method's last trial, on its polynomial.
     #[inline(always)]
     pub fn on(&self, target: usize, method: &dyn Course<S, D>, dt: S::Real) -> S::Real {
-        let x = method.real_at(dt, &self.system.watched());
-        self.value(target, self.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
+        let x = method.real_at(dt, &self.targets.system.watched());
+        self.targets.value(target, self.targets.at.t + dt, &vector!(S, D; n => S::lift(x[n])))
     }
 
     /// Looks at the method's last trial, of size `h`, in these lanes: most steps cross no target.
     #[inline(always)]
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
-        let probes = method.along(h, K::PROBES, &self.system.watched());
+        let probes = method.along(h, K::PROBES, &self.targets.system.watched());
         let mut suspect = [S::mask(false); TARGETS];
-        self.system.suspect(
-            self.at,
-            self.wall,
+        self.targets.system.suspect(
+            self.targets.at,
+            self.targets.wall,
             &Probes { h, parts: K::PROBES, states: &probes },
             &mut suspect,
         );
@@ -181,61 +109,6 @@ where
             *suspect = suspect.and(lanes);
         }
         Look { probes, suspect }
-    }
-
-    /// Whether the target's function is as slow as the state.
-    #[inline(always)]
-    fn is_steady(&self, target: usize) -> bool {
-        target == WALL || self.system.is_steady(target, &self.at.sides)
-    }
-
-    /// The lanes that may cross each target, by so many places.
-    #[inline(always)]
-    fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, suspect: &mut [S::Mask; TARGETS]) {
-        // Unrolled, so that each target's function is known.
-        unroll!(target in 0..TARGETS => {
-            if self.has(target) {
-                suspect[target] = self.at_target(target, places, probes);
-            }
-        });
-    }
-
-    /// The lanes that may cross a target, by so many places.
-    #[inline(always)]
-    fn at_target(&self, target: usize, places: usize, probes: &Probes<'_, S::Real, D>) -> S::Mask {
-        if !self.is_steady(target) {
-            return S::mask(true);
-        }
-        let parts = &probes.parts[..places];
-        let mut values = [S::Real::zero(); MOST_PROBES];
-        let mut beyond = S::mask(false);
-        for i in 0..places {
-            let x = vector!(S, D; n => S::lift(probes.states[i][n]));
-            values[i] = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
-            beyond = beyond.or(values[i].less(S::Real::zero()));
-        }
-        if places == MOST_PROBES {
-            // A long step: quarters alone hide zeros of a series that ends. At the start is the straight line through the
-            // next two places.
-            let mut least = values[0].scale(3.0) - values[1];
-            let mut bend = S::Real::zero();
-            for i in 1..MOST_PROBES {
-                least = least.min(values[i - 1] + values[i]);
-                if i % 2 == 0 {
-                    bend = bend.max((values[i] - values[i - 1].scale(2.0) + values[i - 2]).abs());
-                }
-            }
-            return beyond.or(bend.scale(CLEAR_SUM).less(least).not());
-        }
-        // A function that is farther from zero than it changes near both ends has no dip.
-        let (a, b, c, d) = (values[0], values[1], values[2], values[3]);
-        let least = a.min(d);
-        let mut doubt = ((a - b).abs() + (c - d).abs()).less(least).not();
-        if doubt.any() {
-            let bend = (a - b.scale(2.0) + c).abs().max((b - c.scale(2.0) + d).abs());
-            doubt = doubt.and(bend.scale(CLEAR).less(least).not());
-        }
-        beyond.or(doubt)
     }
 
     /// The first crossings within the method's last trial, of size `h`, that was looked at in these lanes.
@@ -260,11 +133,11 @@ where
         let mut earliest = infinite;
         let mut stale = never;
         for target in 0..TARGETS {
-            if !self.has(target) || !look.suspect[target].any() {
+            if !self.targets.has(target) || !look.suspect[target].any() {
                 continue;
             }
             let on = |dt: S::Real| self.on(target, method, dt);
-            let start = self.value(target, self.at.t, &self.at.x);
+            let start = self.targets.value(target, self.targets.at.t, &self.targets.at.x);
             let mut scale = magnitude(start);
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
@@ -272,7 +145,7 @@ where
             for (i, &theta) in method.probes().iter().enumerate() {
                 let dt = h.scale(theta);
                 let x = vector!(S, D; n => S::lift(look.probes[i][n]));
-                let value = self.value(target, self.at.t + dt, &x);
+                let value = self.targets.value(target, self.targets.at.t + dt, &x);
                 scale = scale.max(magnitude(value));
                 values[i + 1] = value;
                 let new = value.less(zero).and(wrong.not());
@@ -283,7 +156,7 @@ where
                     early = new;
                 }
             }
-            let steady = self.is_steady(target);
+            let steady = self.targets.is_steady(target);
             let least = S::Real::constant(if target == WALL { 0.0 } else { self.noise });
             let open = lanes.and(look.suspect[target]);
             let values = &values[..=method.probes().len()];
@@ -361,7 +234,7 @@ where
         (first, last): (f64, f64),
         most: &Cell<f64>,
     ) -> Located {
-        let Some(laws) = self.system.enclosing(lane) else { return Located::Unknown };
+        let Some(laws) = self.targets.system.enclosing(lane) else { return Located::Unknown };
         let mut coefficients = Vec::new();
         let unit = method.polynomial(&mut coefficients).lane(lane);
         let size = h.lane(lane);
@@ -371,11 +244,11 @@ where
             method,
             target,
             lane,
-            step: (self.at.t.lane(lane), size),
+            step: (self.targets.at.t.lane(lane), size),
             most,
             polynomials: Polynomials::new(coefficients.len(), size / unit, coefficient),
             laws,
-            sides: self.at.sides.map(|side| Enclosed::mask(side.lane(lane))),
+            sides: self.targets.at.sides.map(|side| Enclosed::mask(side.lane(lane))),
         };
         let start = Some((0.0, first, false));
         // How deep it gets beyond the surface between these parts of the step.

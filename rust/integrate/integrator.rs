@@ -1,15 +1,16 @@
 //! The one stepping loop.
 
 use super::cancel;
-use super::event_location::{EventIteration, EventStatus, Look, SurfaceMonitor, TARGETS, WALL, union};
-use super::method::{Course, Method, StepStart, Trial};
+use super::event_location::{EventIteration, EventStatus, Look, SurfaceMonitor, union};
+use super::method::{Course, Method, Trial};
 use super::runge_kutta::Dopri5;
 use super::saltation::pass;
 use super::step_size::{PiController, initial_step};
-use super::tolerance::{ErrorNorm, Failure, Tolerance};
-use crate::model::{AnySystem, MAX_SURFACES, Sides, System, choose, sides_of};
-use crate::scalar::{self, InstructionSet, Isa, Mask, Real, Scalar};
-use crate::unroll::{unroll, vector};
+use crate::failure::Failure;
+use crate::model::{AnySystem, MAX_SURFACES, Sides, StepStart, System, TARGETS, WALL, choose, sides_of};
+use crate::scalar::{self, InstructionSet, Isa, Mask, Real, Scalar, vector};
+use crate::tolerance::{ErrorNorm, Tolerance};
+use crate::unroll::unroll;
 
 /// The work, summed over the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -531,7 +532,7 @@ impl<S: Scalar, const D: usize> Run<S, D> {
                 if !self.landing.on[target].any() {
                     continue;
                 }
-                let own = watch.value(target, self.at.t + trial.size, &trial.x);
+                let own = watch.targets.value(target, self.at.t + trial.size, &trial.x);
                 value = S::Real::select(self.landing.on[target], own, value);
             }
             let on = self.landing.on;

@@ -1,25 +1,12 @@
 //! The interface of a one-step method to the stepping loop.
 
-use super::tolerance::ErrorNorm;
-use crate::model::{AnySystem, Sides, System};
-use crate::scalar::Scalar;
-use crate::unroll::vector;
-
-/// So many places within a step are looked at side by side, at most.
-pub const MOST_PROBES: usize = 8;
+use crate::model::{AnySystem, MOST_PROBES, StepStart, System};
+use crate::scalar::{Scalar, vector};
+use crate::tolerance::ErrorNorm;
 
 /// Where a step is looked at: a long one, as of a high order, more closely.
 pub(super) const QUARTERS: &[f64] = &[0.25, 0.5, 0.75, 1.0];
 pub(super) const EIGHTHS: &[f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
-
-/// Where a run stands, lane by lane.
-#[derive(Clone, Copy, Debug)]
-pub struct StepStart<S: Scalar, const D: usize> {
-    pub t: S::Real,
-    pub x: [S; D],
-    /// The side of each switching surface that the law is taken on.
-    pub sides: Sides<S>,
-}
 
 /// The result of a trial step.
 #[derive(Clone, Copy, Debug)]

@@ -18,18 +18,19 @@ pub mod step_size;
 mod steps;
 pub mod tableau;
 mod taylor;
-mod tolerance;
 pub mod zeros;
 
 pub use cancel::CancelFlag;
 pub use dop853::Dop853Scheme;
-pub use event_location::{Probes, TARGETS, WALL, suspect, suspect_in_turn};
 pub use integrator::{Counts, Ending, Integrator, Progress};
-pub use method::{MOST_PROBES, Method, StepStart, Trial};
+pub use method::{Method, Trial};
 pub use propagate::propagate;
 pub use rodas::Rodas;
 pub use runge_kutta::{Dop853, Dopri5, RungeKutta, step};
 pub use saltation::pass;
 pub use steps::Steps;
 pub use taylor::{Taylor, order};
-pub use tolerance::{ErrorNorm, Failure, MaybeTangents, Tolerance, WithTangents};
+
+pub use crate::failure::Failure;
+pub use crate::model::{MOST_PROBES, Probes, StepStart, TARGETS, WALL};
+pub use crate::tolerance::{ErrorNorm, MaybeTangents, Tolerance, WithTangents};

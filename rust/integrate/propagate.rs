@@ -2,9 +2,10 @@
 
 use super::cancel;
 use super::integrator::Integrator;
-use super::tolerance::{Failure, Tolerance};
+use crate::failure::Failure;
 use crate::model::{AnySystem, System};
 use crate::scalar::Scalar;
+use crate::tolerance::Tolerance;
 
 /// More steps than this within one propagation mean that something is wrong.
 const MOST_STEPS: u64 = 1_000_000;

@@ -2,11 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::method::{Method, QUARTERS, StepStart, Trial};
-use super::tolerance::ErrorNorm;
-use crate::model::System;
-use crate::scalar::{WIDTH, Wide};
-use crate::unroll::vector;
+use super::method::{Method, QUARTERS, Trial};
+use crate::model::{StepStart, System};
+use crate::scalar::{WIDTH, Wide, vector};
+use crate::tolerance::ErrorNorm;
 
 const STAGES: usize = 8;
 const GAMMA: f64 = 0.21193756319429014;

@@ -3,12 +3,12 @@
 use std::marker::PhantomData;
 
 use super::dop853::Dop853Scheme;
-use super::method::{EIGHTHS, MOST_PROBES, Method, QUARTERS, StepStart, Trial};
+use super::method::{EIGHTHS, Method, QUARTERS, Trial};
 use super::tableau::{DormandPrince, Scheme};
-use super::tolerance::ErrorNorm;
-use crate::model::{Sides, System};
-use crate::scalar::{Real, Scalar};
-use crate::unroll::{unroll, vector};
+use crate::model::{MOST_PROBES, Sides, StepStart, System};
+use crate::scalar::{Real, Scalar, vector};
+use crate::tolerance::ErrorNorm;
+use crate::unroll::unroll;
 
 /// The state whose components are these. Many of them, or those with derivatives, are taken in a loop: unrolled, the
 /// twelve stages of six are the longest functions of all.

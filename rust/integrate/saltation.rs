@@ -1,8 +1,7 @@
 //! Tangents through a switch where the law jumps.
 
 use crate::model::{Sides, System};
-use crate::scalar::{Mask, Real, Scalar};
-use crate::unroll::vector;
+use crate::scalar::{Mask, Real, Scalar, vector};
 
 /// A surface's rate of change is a central difference over this time; exact where the surface is linear.
 const AHEAD: f64 = 1e-6;

@@ -1,11 +1,9 @@
 //! The size of the steps.
 
-use super::method::StepStart;
-use super::tolerance::Tolerance;
-use crate::model::System;
+use crate::model::{StepStart, System};
 use crate::scalar::elementary::{exp2_rough, log2_rough};
-use crate::scalar::{Mask, Real, Scalar};
-use crate::unroll::vector;
+use crate::scalar::{Mask, Real, Scalar, vector};
+use crate::tolerance::Tolerance;
 
 /// Safety factor, and the narrowest and widest change of the step size.
 const SAFETY: f64 = 0.9;

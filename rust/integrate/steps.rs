@@ -2,8 +2,9 @@
 
 use super::integrator::{Counts, Ending, Integrator};
 use super::method::Method;
-use super::tolerance::{ErrorNorm, Failure};
+use crate::failure::Failure;
 use crate::model::{Sides, System};
+use crate::tolerance::ErrorNorm;
 
 /// So many steps are taken without a look at anything but the time.
 const MOST: usize = 64;

@@ -1,11 +1,10 @@
 //! The Taylor method.
 
-use super::method::{EIGHTHS, MOST_PROBES, Method, StepStart, Trial};
-use super::tolerance::{ErrorNorm, Tolerance};
-use crate::model::System;
-use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work};
+use super::method::{EIGHTHS, Method, Trial};
+use crate::model::{MOST_PROBES, StepStart, System};
+use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, vector};
 use crate::tape::{HIGH, Jets, LOW, Tape};
-use crate::unroll::vector;
+use crate::tolerance::{ErrorNorm, Tolerance};
 
 const COEFFICIENTS: usize = HIGH + 1;
 

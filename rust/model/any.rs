@@ -1,7 +1,6 @@
 //! A system whose type is forgotten.
 
-use super::{EnclosedSurfaces, Piece, Sides, System};
-use crate::integrate::{Probes, StepStart, TARGETS};
+use super::{EnclosedSurfaces, Piece, Probes, Sides, StepStart, System, TARGETS};
 use crate::scalar::Scalar;
 
 /// Any [`System`]. Code that runs rarely is compiled for a `dyn AnySystem`: once for each kind of number instead of

@@ -1,7 +1,6 @@
 //! One of two models of the same dimension.
 
-use super::{EnclosedSurfaces, Family, Parameter, Piece, Sides, System};
-use crate::integrate::{Probes, StepStart, TARGETS};
+use super::{EnclosedSurfaces, Family, Parameter, Piece, Probes, Sides, StepStart, System, TARGETS};
 use crate::scalar::Scalar;
 
 /// A model of one kind or of another, distinguished at run time.

@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use super::sliding_mode::{self, SlidingSurface};
 use super::{
-    EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Sides, Signals, System,
-    choose, enclosed, parameter, sides_of,
+    EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Probes, Sides, Signals,
+    StepStart, System, TARGETS, choose, enclosed, parameter, sides_of, suspect_in_turn,
 };
-use crate::formula::{Expression, Kinks, Mistake, Names, Place, Program};
-use crate::integrate::{Probes, StepStart, TARGETS, suspect_in_turn};
+use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Op, Place, Program};
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
 
 /// A power of two, far from the states that linear functions are asked for.
@@ -23,13 +22,19 @@ struct Law {
     /// The rates with comparisons in place of surfaces.
     written: Program,
     surfaces: Vec<Program>,
+    /// The components of the state that the surfaces depend on.
+    watched: Vec<bool>,
     kinks: Kinks,
 }
 
 impl Law {
     fn of(equations: &[Expression], written: Program, kinks: Kinks) -> Self {
         let surfaces = kinks.surfaces.iter().map(|own| Program::of([own])).collect();
-        Self { rates: Program::of(equations), written, surfaces, kinks }
+        // Between sliding and not, the rates decide.
+        let slides = !kinks.sliding.is_empty();
+        let takes = |n: usize| kinks.surfaces.iter().any(|own| own.ops().contains(&Op::Push(Leaf::State(n))));
+        let watched = (0..equations.len()).map(|n| slides || takes(n)).collect();
+        Self { rates: Program::of(equations), written, surfaces, watched, kinks }
     }
 }
 
@@ -57,9 +62,24 @@ pub struct Own<S, const D: usize> {
 
 impl<S: Scalar, const D: usize> Own<S, D> {
     /// The results of a program at a place, of which the parameters determine what is `fixed`.
-    // One function for each kind of number: the room for the inputs is long beside a short law.
-    #[inline(never)]
+    #[inline(always)]
     fn evaluate(
+        &self,
+        (program, fixed): (&Program, &[S]),
+        (t, x): (S, &[S; D]),
+        sides: &Sides<S>,
+        results: &mut [S],
+    ) {
+        match self.inputs {
+            InputValues::None => program.run(&Place { t, x, rates: &[], inputs: &[] }, fixed, sides, results),
+            _ => self.evaluate_driven((program, fixed), (t, x), sides, results),
+        }
+    }
+
+    /// The same at the values of the inputs.
+    // One function for each kind of number: the room for the inputs is long compared with a short law.
+    #[inline(never)]
+    fn evaluate_driven(
         &self,
         (program, fixed): (&Program, &[S]),
         (t, x): (S, &[S; D]),
@@ -166,6 +186,10 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
             Some(&steady) => steady,
             None => !self.sliding_on(j).is_some_and(|i| self.sliding[i].slides(sides).any()),
         }
+    }
+
+    fn watched(&self) -> [bool; D] {
+        std::array::from_fn(|n| self.law.watched[n])
     }
 
     fn enclosing(&self, lane: usize) -> Option<Box<dyn EnclosedSurfaces<D> + '_>> {

@@ -17,6 +17,7 @@ mod observation;
 mod pendulum;
 mod sliding_mode;
 pub mod stick_slip;
+mod targets;
 
 pub use any::AnySystem;
 pub use disk::{Disk, DiskFamily};
@@ -29,15 +30,10 @@ pub use lugre::WithLuGre;
 pub use observation::Observation;
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick_slip::Sticking;
+pub use targets::{MOST_PROBES, Probes, StepStart, TARGETS, Targets, WALL, suspect, suspect_in_turn};
 
-use crate::integrate::{Probes, StepStart, TARGETS, suspect};
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
-
-/// The most switching surfaces a model can have.
-pub const MAX_SURFACES: usize = 6;
-
-/// On which side of each switching surface the law is taken: true where its function is positive.
-pub type Sides<S> = [<S as Scalar>::Mask; MAX_SURFACES];
+pub use crate::sides::{MAX_SURFACES, Sides, choose};
 
 /// A system of `D` ordinary differential equations.
 pub trait System<S: Scalar, const D: usize>: Sync {
@@ -247,12 +243,6 @@ pub fn sides_of<S: Scalar, const D: usize>(system: &impl System<S, D>, t: S, x: 
     }
     system.settle(t, x, &mut sides);
     sides
-}
-
-/// `yes` in the lanes where `mask` is true, `no` in the others.
-#[inline(always)]
-pub fn choose<M: Mask>(mask: M, yes: M, no: M) -> M {
-    mask.and(yes).or(mask.not().and(no))
 }
 
 /// A parameter of a model or an effect.

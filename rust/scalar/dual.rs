@@ -3,7 +3,8 @@
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::{Real, Scalar};
-use crate::unroll::{unroll, vector};
+use crate::scalar::vector;
+use crate::unroll::unroll;
 
 /// `re + Σ_i d[i] ε_i` with `ε_i ε_j = 0`. The inner scalar may itself be a dual (nested
 /// derivatives) or a packet.

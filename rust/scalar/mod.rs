@@ -13,6 +13,7 @@ mod isa;
 mod lanes;
 mod packet;
 mod real;
+mod vector;
 
 pub use dual::Dual;
 pub use fan::DerivativeLanes;
@@ -20,6 +21,7 @@ pub use interval::{Enclosed, Interval, Truth};
 pub(crate) use isa::run_with;
 pub use isa::{InstructionSet, Isa, LANES, Plain, Work};
 pub use packet::{LaneMask, Packet};
+pub(crate) use vector::vector;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};

@@ -5,8 +5,8 @@ use super::node::{INVERSE, hold};
 use super::specialised::Specialised;
 use super::{Invariant, Node, Tape, disk_series, dle_series};
 use crate::model::{Piece, Sides};
-use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work};
-use crate::unroll::{unroll, vector};
+use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, vector};
+use crate::unroll::unroll;
 
 /// The orders whose programs are unrolled, which takes long to compile.
 pub const LOW: usize = 10;

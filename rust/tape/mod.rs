@@ -20,7 +20,7 @@ pub use node::{Invariant, Node, Step};
 pub use record::Unrecordable;
 pub use symbol::{Function, SurfaceSideRef, Symbol};
 
-use crate::integrate::Failure;
+use crate::failure::Failure;
 use crate::model::Sides;
 use crate::scalar::Scalar;
 

@@ -3,10 +3,10 @@
 use std::convert::identity;
 
 use super::Jets;
-use crate::integrate::ErrorNorm;
 use crate::scalar::elementary::power_rough;
-use crate::scalar::{InstructionSet, Mask, Packet, Real, Scalar, Work};
-use crate::unroll::{unroll, vector};
+use crate::scalar::{InstructionSet, Mask, Packet, Real, Scalar, Work, vector};
+use crate::tolerance::ErrorNorm;
+use crate::unroll::unroll;
 
 /// 2^-600: the square of the largest number times this, over a tolerance, is still a number.
 const SMALL: f64 = f64::from_bits((1023 - 600) << 52);

@@ -1,6 +1,6 @@
 //! Time averages with honest errors, from the means over blocks of a run.
 
-use crate::unroll::vector;
+use crate::scalar::vector;
 
 /// Sums of `N` quantities over consecutive pieces of a run.
 #[derive(Clone, Debug)]

@@ -13,8 +13,7 @@ use crate::analysis::lyapunov::tangent_frame::{LogGrowth, tangents};
 use crate::analysis::trajectory::Outcome;
 use crate::integrate::{Failure, Tolerance, WithTangents, order};
 use crate::model::Family;
-use crate::scalar::{Dual, Isa, Mask, Real};
-use crate::unroll::vector;
+use crate::scalar::{Dual, Isa, Mask, Real, vector};
 
 /// A block is no shorter than this many steps.
 const LEAST_STEPS: f64 = 32.0;

@@ -3,8 +3,8 @@
 use crate::analysis::batch::lanes::work;
 use crate::integrate::{ErrorNorm, Integrator, Method};
 use crate::model::System;
-use crate::scalar::{InstructionSet, Isa, Real, Scalar, Work};
-use crate::unroll::{unroll, vector};
+use crate::scalar::{InstructionSet, Isa, Real, Scalar, Work, vector};
+use crate::unroll::unroll;
 
 /// Gauss-Legendre nodes on `[0, 1]` and their weights: exact for products of polynomials of degree 7.
 const NODES: [f64; 8] = [

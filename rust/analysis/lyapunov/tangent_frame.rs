@@ -3,8 +3,8 @@
 use crate::analysis::batch::lanes::work;
 use crate::integrate::{ErrorNorm, Integrator, Method};
 use crate::model::System;
-use crate::scalar::{Dual, InstructionSet, Isa, Mask, Real, Work};
-use crate::unroll::{unroll, vector};
+use crate::scalar::{Dual, InstructionSet, Isa, Mask, Real, Work, vector};
+use crate::unroll::unroll;
 
 /// The state with `N` orthonormal tangents that no symmetry singles out. The padding states at the end are separate
 /// from the others: with as many tangents as states, the last tangents lie along them.

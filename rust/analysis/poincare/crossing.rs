@@ -10,8 +10,7 @@ use crate::integrate::root::bracketed;
 use crate::integrate::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes};
 use crate::integrate::{ErrorNorm, MOST_PROBES, Method};
 use crate::model::{Family, MAX_SURFACES, Sides, System, choose};
-use crate::scalar::{Isa, Mask, Real};
-use crate::unroll::vector;
+use crate::scalar::{Isa, Mask, Real, vector};
 
 /// Looked for to this part of the function's largest value near the crossing, and to this size.
 const ZERO: f64 = 1e-14;

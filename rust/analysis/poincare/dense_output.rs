@@ -3,8 +3,7 @@
 use crate::analysis::poincare::sign_changes::{CLEAR, Side, Stretch, in_doubt, judge};
 use crate::integrate::{MOST_PROBES, Method};
 use crate::model::choose;
-use crate::scalar::{InstructionSet, Isa, Mask, Packet, Real, Scalar, Work};
-use crate::unroll::vector;
+use crate::scalar::{InstructionSet, Isa, Mask, Packet, Real, Scalar, Work, vector};
 
 /// The polynomials of a step, one for each component of the state, in their own unit of time.
 pub struct DenseOutput<'a, R: Real, const D: usize> {

@@ -11,8 +11,7 @@ use crate::analysis::poincare::crossing::{Crossing, Scan};
 use crate::formula::Expression;
 use crate::integrate::{Failure, Tolerance, order};
 use crate::model::Family;
-use crate::scalar::{Isa, Mask, Real};
-use crate::unroll::vector;
+use crate::scalar::{Isa, Mask, Real, vector};
 
 /// A component of the state beyond this has escaped to infinity.
 pub const ESCAPE_BOUND: f64 = 1e6;

@@ -6,8 +6,7 @@ use super::{
     Body, Contributions, EffectInputs, Formula, FrictionModel, Kind, MAX_PARAMETERS, Momentum, Slot,
 };
 use crate::model::{Parameter, parameter};
-use crate::scalar::Scalar;
-use crate::unroll::vector;
+use crate::scalar::{Scalar, vector};
 
 /// Where an effect's law comes from.
 #[derive(Clone, Debug, PartialEq)]
