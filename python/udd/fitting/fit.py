@@ -31,6 +31,7 @@ from .model_error_schedule import (
     eased,
     provisional_fit,
     reduce_model_error,
+    with_negligible_model_error,
 )
 from .noise import estimated, stated
 from .parameters import Free, free_parameters, known_camera, names_of
@@ -151,7 +152,7 @@ def fit(
     (result,) = checked_units(
         measurement, model, options, lambda: (fit_record(measurement, record, model, **options),)
     )
-    return result.without_cache().with_diagnostics()
+    return with_negligible_model_error(result).without_cache().with_diagnostics()
 
 
 def options_of(

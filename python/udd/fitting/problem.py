@@ -139,6 +139,9 @@ class Fit(Drawable):
         The measurement's noise as the record shows it.
     widened : float
         Factor by which `errors` were inflated for missing physics; the covariance by its square.
+    limit : tuple of float, optional
+        Model error of the parameters and their covariance, per square root of a second, if it is below that
+        of `problem`. The numbers of a right law do not depend on it.
     unit_doubt : str or None
             Sentence about a unit that explains the record far better than the given one.
 
@@ -170,6 +173,7 @@ class Fit(Drawable):
     problem: Problem
     point: Point
     widened: float = 1.0
+    limit: tuple[float, ...] | None = None
     unit_doubt: str | None = None
 
     @property

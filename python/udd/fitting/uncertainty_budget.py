@@ -201,7 +201,7 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
 
 def _moved(fit: Fit, name: str, by: float) -> NDArray[np.float64]:
     """Compute the change of each free parameter if a fixed one is changed."""
-    problem = fit.problem
+    problem = fit.problem.with_model_error(fit.limit or fit.problem.diffusion)
     order = list(fit.model.parameters).index(name)
     models = tuple(model.with_parameters({name: model.parameters[name] + by}) for model in problem.models)
     sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fit.point.sets]
