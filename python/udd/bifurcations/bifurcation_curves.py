@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize
 
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
@@ -362,17 +361,13 @@ class _Way:
 
     def _at_bound(self, segment: Segment, k: int, bound: float) -> tuple[float, SurfacePoint] | None:
         """The part of a step after which the curve meets a bound of parameter `k`, and the point there."""
-        places: dict[float, SurfacePoint] = {}
 
-        def beyond(part: float) -> float:
-            places[part] = segment.at(part)
-            return float(self.surface.values(places[part])[k] - bound)
+        def beyond(point: SurfacePoint) -> float:
+            return float(self.surface.values(point)[k] - bound)
 
+        if abs(beyond(segment.begin)) <= 1e-12 * (abs(bound) or 1.0):
+            return None  # it begins on the bound
         try:
-            if abs(beyond(0.0)) <= 1e-12 * (abs(bound) or 1.0):
-                return None  # it begins on the bound
-            part = float(optimize.brentq(beyond, 0.0, 1.0, xtol=1e-14))
-            beyond(part)
+            return segment.zero(beyond)
         except (CorrectorFailed, IntegrationError, ValueError, RuntimeError):
             return None
-        return part, places[part]

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from scipy import optimize
 
 from udd.errors import IntegrationError
 
@@ -25,6 +24,7 @@ from .pseudo_arclength import (
     newton_corrector,
     predictor_corrector_step,
     tangent_at,
+    zero_between,
 )
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium
@@ -183,16 +183,12 @@ def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[floa
     CorrectorFailed, ValueError
         The curve cannot be followed there, or the function does not change its sign.
     """
-    cache: dict[float, CurvePoint] = {}
 
-    def at(sigma: float) -> float:
-        cache[sigma] = _beside(curve, a, sigma)
-        return float(getattr(curve.test_functions(cache[sigma]), name))
+    def at(sigma: float) -> tuple[float, CurvePoint]:
+        place = _beside(curve, a, sigma)
+        return float(getattr(curve.test_functions(place), name)), place
 
-    sigma = float(optimize.brentq(at, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
-    if sigma not in cache:
-        at(sigma)
-    return sigma, cache[sigma]
+    return zero_between(at, step)
 
 
 def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> CurvePoint:
@@ -200,10 +196,6 @@ def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> CurvePoint:
 
     Next to a branch point the equations leave a second direction free, in which rounding alone would move
     Newton's method: there it takes the shortest steps.
-
-    Raises
-    ------
-    CorrectorFailed
     """
     guess = a.u + distance * a.tangent
     try:

@@ -171,7 +171,7 @@ class ConnectingCurve:
         """The curve with its phase and its planes fixed here."""
         flow, values, nodes, rests = self.flow, self.values_at(u), self.nodes(u), self.rests(u)
         middle = nodes[len(nodes) // 2]
-        rate = flow.with_values(values).rates(0.0, flow.full(middle))[flow.kept] / flow.size
+        rate = flow.rates(values, middle) / flow.size
         first, last = (self._projectors(rests[k], values, k)[k] for k in (0, -1))
         begin, end = (np.linalg.svd(p.T)[0][:, : round(float(np.trace(p)))].T for p in (first, last))
         across = rate / np.linalg.norm(rate)

@@ -284,8 +284,8 @@ class Branch(Drawable):
         )
 
 
-def cycles_of(branch: Branch) -> PeriodicOrbitCurve:
-    """The curve of a branch of cycles that is followed over a parameter of a model that is not forced.
+def cycles_of(branch: Branch) -> list[tuple[PeriodicOrbitCurve, Floats]]:
+    """Return the curves and unknowns of the cycles of a branch over a parameter of an autonomous model.
 
     Raises
     ------
@@ -297,4 +297,4 @@ def cycles_of(branch: Branch) -> PeriodicOrbitCurve:
     curve = branch._places[0][0]
     if not isinstance(curve, PeriodicOrbitCurve) or curve.parameter == HELD or curve.flow.forcing is not None:
         raise ModelError("the branch must be followed over a parameter of a model that is not forced")
-    return curve
+    return [(curve, place.u) for curve, place in branch._places if isinstance(curve, PeriodicOrbitCurve)]

@@ -40,13 +40,8 @@ def size_of(curve: PeriodicOrbitCurve, u: Floats) -> float:
     return float(np.linalg.norm(_shape(curve, u))) / float(np.sqrt(curve.pieces))
 
 
-def _orbit(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
-    nodes = curve.nodes(u)
-    return np.vstack([nodes, curve.mirror * nodes]) if curve.symmetric else nodes
-
-
 def _shape(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
-    scaled = _orbit(curve, u) / curve.flow.size
+    scaled = curve.around(u) / curve.flow.size
     shape: Floats = (scaled - scaled.mean(axis=0))[: curve.pieces]
     return shape
 
@@ -55,7 +50,7 @@ def hopf_end(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
     """The Hopf bifurcation from which a small cycle comes, as the branch of equilibria has it."""
     flow, size, period = curve.flow, size_of(curve, u), curve.period(u)
     rest = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
-    centre = _orbit(curve, u).mean(axis=0)
+    centre = curve.around(u).mean(axis=0)
     guess = rest.pack(centre, curve.value(u))
     step = max(0.3 * size, _SHORTEST)
     point = nearest_bifurcation(rest, guess, natural_constraint(guess), "Hopf", step)
@@ -111,7 +106,7 @@ def _distance(first: PeriodicOrbitCurve, u: Floats, second: PeriodicOrbitCurve, 
 
     flow = first.flow
     around = flow.reduced(orbit_states(second, v))
-    nodes = _orbit(first, u)
+    nodes = first.around(u)
     gaps = nodes[:, None] - around[None]
     gaps = (gaps + flow.turns(gaps)) / flow.size
     sides = np.roll(around, -1, axis=0) - around

@@ -208,9 +208,7 @@ def through_cycle(curve: PeriodicOrbitCurve, u: Floats) -> tuple[ConnectingCurve
         It comes near no equilibrium.
     """
     flow, values, nodes, m = curve.flow, curve.values_at(u), curve.nodes(u), curve.pieces
-    rates = flow.with_values(values).rates(0.0, flow.full(nodes))[:, flow.kept]
-    speed = np.linalg.norm(rates * flow.clock / flow.size, axis=1)
-    rests = [refined(flow, values, nodes[i]) for i in np.argsort(speed)[:_TRIED]]
+    rests = [refined(flow, values, nodes[i]) for i in np.argsort(curve.speeds(u))[:_TRIED]]
     passages = [
         (float(away.min()), int(away.argmin()), rest)
         for rest in rests

@@ -332,10 +332,9 @@ class _Manifold:
         first, last = int(left) + 1, int(apart[0])
         latest = left + _FINE * self.longest / flow.clock
         best = None
-        ways = [(False, np.ones(flow.dim))]
-        if flow.mirror is not None and not np.allclose(flow.mirror * a.rest, a.rest, atol=1e-9):
-            ways.append((True, flow.mirror))
-        for image, mirror in ways:
+        for image, mirror in enumerate(flow.images):
+            if image and np.allclose(mirror * a.rest, a.rest, atol=1e-9):
+                continue
             away = [(c.path[first : last + 1] - mirror * c.rest) / flow.size for c in (a, b)]
             side = [far @ (mirror * c.left) for far, c in zip(away, (a, b), strict=True)]
             distance = np.maximum(*(np.linalg.norm(far, axis=1) for far in away))
@@ -345,7 +344,7 @@ class _Manifold:
                 # It came when it was last further away.
                 far = np.flatnonzero(distance[: k + 1] > _NEAR)
                 came = first + (int(far[-1]) if len(far) else 0)
-                best = _Part(came, first + k, image, float(beside[k]))
+                best = _Part(came, first + k, bool(image), float(beside[k]))
         part = best or _Part(last, last, False, np.inf)
         return part if part.came <= latest else None
 
@@ -379,7 +378,7 @@ class _Manifold:
         every = max(1, last // pieces)
         where = np.arange(last % every, last + 1, every)
         nodes, span = curve.path[where], float((len(where) - 1) * every * step)
-        mirror = flow.mirror if image and flow.mirror is not None else np.ones(flow.dim)
+        mirror = flow.images[int(image)]
         rest, way = curve.rest, self.alone(curve.value, curve.rest)
         if way is not None and way.number < 0.0:
             # Followed backward: the orbit comes from the target.

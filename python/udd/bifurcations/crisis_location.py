@@ -21,7 +21,6 @@ from .branch import Branch, cycles_of
 from .flow_map import Floats, FlowMap
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
 from .saddle_cycles import SaddleCycle, saddle_at
-from .shooting_curve import PeriodicOrbitCurve
 from .solutions import PeriodicOrbit
 from .transient_lifetimes import first_stay
 
@@ -147,7 +146,7 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     >>> print(one.kind, one.side)
     boundary crisis above
     """
-    flow = cycles_of(branch).flow
+    flow = cycles_of(branch)[0][0].flow
     count, rounds = whole("n", n, 10), whole("depth", depth, 5)
     require_memory(f"{count} orbits of {rounds} rounds", count, rounds, 8, itemsize=8)
     sides = (_Search(branch, flow, side, count, rounds) for side in (1.0, -1.0))
@@ -190,9 +189,8 @@ class _Search:
         """Return those between neighbouring cycles of the branch of which one side is shut in."""
         marks: list[tuple[SaddleCycle, bool] | None] = []
         last: SaddleCycle | None = None
-        for curve, place in self.branch._places:
-            assert isinstance(curve, PeriodicOrbitCurve)
-            saddle = SaddleCycle.of(curve, place.u)
+        for cycle in cycles_of(self.branch):
+            saddle = SaddleCycle.of(*cycle)
             if saddle is None or saddle.multiplier < _SLOW:
                 marks.append(None)
                 continue

@@ -20,7 +20,6 @@ from .flow_map import Floats, FlowMap
 from .invariant_manifolds import direction_alone
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
 from .saddle_cycles import SaddleCycle, saddle_at
-from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["CycleConnection", "cycle_connections"]
@@ -108,17 +107,16 @@ def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleCon
     >>> print(one.kind, round(one.value, 9))
     equilibrium to cycle 3.691730046
     """
-    flow = cycles_of(branch).flow
+    flow = cycles_of(branch)[0][0].flow
     if not isinstance(equilibrium, Equilibrium):
         raise ModelError(f"an equilibrium is needed, not {equilibrium!r}")
     growing = equilibrium.eigenvalues.real > 0.0
     if 1 not in (growing.sum(), (~growing).sum()):
         raise ModelError("the equilibrium has no eigenvalue alone on its side of the imaginary axis")
-    guess, plain = flow.reduced(equilibrium.state), np.ones(flow.dim)
+    guess, images = flow.reduced(equilibrium.state), flow.images
     time = 1.0 if growing.sum() == 1 else -1.0
-    sides = [(1.0, plain), (-1.0, plain)]
-    if flow.mirror is not None and not branch.symmetric:
-        sides.append((1.0, flow.mirror))
+    sides = [(1.0, images[0]), (-1.0, images[0])]
+    sides += [(1.0, mirror) for mirror in images[1:] if not branch.symmetric]
     searches = (_Search(branch, flow, guess, time, *side) for side in sides)
     return distinct([connection for search in searches for connection in search.connections()])
 
@@ -147,9 +145,8 @@ class _Search:
         """Return those between neighbouring cycles of the branch that are passed on two sides."""
         passages: list[_Passage | None] = []
         last: SaddleCycle | None = None
-        for curve, place in self.branch._places:
-            assert isinstance(curve, PeriodicOrbitCurve)
-            saddle = SaddleCycle.of(curve, place.u, self.time > 0.0)
+        for cycle in cycles_of(self.branch):
+            saddle = SaddleCycle.of(*cycle, self.time > 0.0)
             passages.append(None)
             if saddle is not None:
                 last = saddle = saddle.facing(last)

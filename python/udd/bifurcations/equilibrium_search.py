@@ -159,7 +159,7 @@ class _Found:
 
     def _images(self, x: Floats | None) -> list[Floats]:
         flow, images = self.flow, []
-        for image in () if x is None else (x,) if flow.mirror is None else (x, flow.mirror * x):
+        for image in [] if x is None else [signs * x for signs in flow.images]:
             images.append(_without_rounding(flow, image + flow.turns(image)))
         return images
 
@@ -174,7 +174,7 @@ def _without_rounding(flow: FlowMap, x: Floats) -> Floats:
     if not small.any() or (x[small] == 0.0).all():
         return x + 0.0
     zero = np.where(small, 0.0, x)
-    before, after = (np.abs(flow.model.rates(0.0, flow.full(y))[flow.kept]) for y in (x, zero))
+    before, after = (np.abs(flow.rates(flow.values, y)) for y in (x, zero))
     rounding = _ROUNDING * np.abs(expansion(flow, flow.values, x).by_state) @ flow.size
     return zero if (after <= before + rounding).all() else x + 0.0
 
@@ -297,12 +297,10 @@ def _rest_from(
     flow: FlowMap, values: Floats, guess: Floats, divided: Sequence[Floats] = ()
 ) -> tuple[Floats | None, bool]:
     """The state at which Powell's method finds no rates, and whether their derivatives are regular there."""
-    unit, model = flow.clock / flow.size, flow.with_values(values)
+    unit = flow.clock / flow.size
 
     def rates(scaled: Floats) -> Floats:
-        found = model.rates(0.0, flow.full(scaled * flow.size))[flow.kept]
-        scaled_rates: Floats = found * unit
-        return scaled_rates
+        return flow.rates(values, scaled * flow.size) * unit
 
     def slopes(scaled: Floats) -> Floats:
         by_state = expansion(flow, values, scaled * flow.size).by_state

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ __all__ = ["Floats", "FlowMap", "SegmentEnds", "flow_of"]
 Floats = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
+_RTOL, _ATOL = 1e-13, 1e-15  # Tolerances of the runs, relative to states and to the least typical size.
 _NOTHING = 1e-100  # a smaller state is 0 but for rounding
 
 
@@ -55,8 +57,6 @@ class FlowMap:
         The signs of the model's symmetry, if it has one; of a forced model's, half a period later.
     forcing : Forcing or None
         The period of the rates where they depend on time.
-    rtol, atol : float
-        Tolerances of the runs; `atol` is relative to the sizes.
     """
 
     model: Model
@@ -65,8 +65,6 @@ class FlowMap:
     clock: float
     mirror: Floats | None
     forcing: Forcing | None = None
-    rtol: float = 1e-13
-    atol: float = 1e-15
     _made: dict[bytes, Model] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -128,13 +126,7 @@ class FlowMap:
 
         They begin at the times `t` (m,), by default at 0; `loose` multiplies the tolerances.
         """
-        count = len(x)
-        begin = np.zeros(count) if t is None else t
-        rows = np.tile(values, (count, 1))
-        atol = self.atol * float(np.min(self.size)) * loose
-        ends = _core.shoot(
-            self.model, rows, self.full(x), begin, spans, list(wanted), self.rtol * loose, atol
-        )
+        ends = self._shoot(values, x, spans, wanted, loose, t)
         kept = self.kept
         return SegmentEnds(
             ends["x"][:, kept],
@@ -145,11 +137,31 @@ class FlowMap:
 
     def fly_each(self, values: Floats, x: Floats, spans: Floats, loose: float = 1.0) -> Floats:
         """Return the ends of orbits from `x` (m, r); `values` are those of all (p,) or of each (m, p)."""
+        return np.ascontiguousarray(self._shoot(values, x, spans, (), loose, None)["x"][:, self.kept])
+
+    def _shoot(
+        self,
+        values: Floats,
+        x: Floats,
+        spans: Floats,
+        wanted: tuple[int, ...],
+        loose: float,
+        t: Floats | None,
+    ) -> Any:
         rows = np.tile(values, (len(x), 1)) if values.ndim == 1 else values
-        atol = self.atol * float(np.min(self.size)) * loose
-        begin = np.zeros(len(x))
-        ends = _core.shoot(self.model, rows, self.full(x), begin, spans, [], self.rtol * loose, atol)["x"]
-        return np.ascontiguousarray(ends[:, self.kept])
+        begin = np.zeros(len(x)) if t is None else t
+        rtol, atol = _RTOL * loose, _ATOL * float(np.min(self.size)) * loose
+        return _core.shoot(self.model, rows, self.full(x), begin, spans, list(wanted), rtol, atol)
+
+    def rates(self, values: Floats, x: Floats, t: Floats | float = 0.0) -> Floats:
+        """Return the rates (..., r) at reduced states (..., r)."""
+        rates: Floats = self.with_values(values).rates(t, self.full(x))[..., self.kept]
+        return rates
+
+    @cached_property
+    def images(self) -> list[Floats]:
+        """Signs (r,) of a state's images: of the state itself and, with a symmetry, of its mirror image."""
+        return [np.ones(self.dim)] + ([] if self.mirror is None else [self.mirror])
 
     def with_values(self, values: Floats) -> Model:
         """The model with these parameters; made once for values that come several times in a row."""
@@ -160,7 +172,7 @@ class FlowMap:
         return self._made[key]
 
 
-def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing | None = None) -> FlowMap:
+def flow_of(model: Model, states: Floats, forcing: Forcing | None = None) -> FlowMap:
     """The flow of a model near these states (n, dim).
 
     Raises
@@ -184,8 +196,8 @@ def flow_of(model: Model, states: Floats, rtol: float = 1e-13, forcing: Forcing 
         require_period(model, forcing, kept, finite[kept])
         period, _ = forcing.period(np.array(list(model.parameters.values())))
         mirror = mirror_of(model, kept, finite[kept], period)
-        return FlowMap(model, kept, finite[kept], coordinates.clock, mirror, forcing, rtol)
+        return FlowMap(model, kept, finite[kept], coordinates.clock, mirror, forcing)
     mirror = coordinates.mirrors[0][kept] if coordinates.mirrors else None
     if mirror is not None and (mirror > 0).all():
         mirror = None
-    return FlowMap(model, kept, finite[kept], coordinates.clock, mirror, None, rtol)
+    return FlowMap(model, kept, finite[kept], coordinates.clock, mirror)

@@ -12,29 +12,24 @@ from .flow_map import Floats, FlowMap
 
 @dataclass(frozen=True, eq=False)
 class Eigendirection:
-    """An eigenvalue and its vector, in typical sizes; the vector's largest component is positive."""
+    """An eigenvalue and its right and left vectors, in typical sizes.
+
+    The largest component of the right vector is positive; the left one times it is 1.
+    """
 
     number: float
     vector: Floats
-    _turn: float
-    _place: int
-    _right: np.ndarray
-
-    @property
-    def left(self) -> Floats:
-        """The left eigenvector, which vanishes on the other directions; 1 times the vector."""
-        own: Floats = self._turn * np.linalg.inv(self._right)[self._place].real
-        return own
+    left: Floats
 
 
 def direction_alone(flow: FlowMap, values: Floats, rest: Floats, side: float) -> Eigendirection | None:
-    """The only growing (`side` > 0) or the only other eigendirection of an equilibrium; None for several."""
+    """Return the only growing (`side` > 0) or the only other eigendirection; None if there are several."""
     numbers, right = np.linalg.eig(flow.scaled(expansion(flow, values, rest).by_state))
     growing = numbers.real > 0.0
     alone = np.flatnonzero(growing if side > 0.0 else ~growing)
     if len(alone) != 1 or len(numbers) < 2:
         return None
     place = int(alone[0])
-    vector = right[:, place].real
-    turn = float(np.sign(vector[np.argmax(np.abs(vector))]))
-    return Eigendirection(float(numbers[place].real), turn * vector, turn, place, right)
+    vector, left = right[:, place].real, np.linalg.pinv(right)[place].real
+    turn = np.sign(vector[np.argmax(np.abs(vector))])
+    return Eigendirection(float(numbers[place].real), turn * vector, turn * left)

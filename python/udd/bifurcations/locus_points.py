@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import optimize
 
 from udd.errors import IntegrationError
 
@@ -22,7 +21,7 @@ from .normal_forms import (
     second_lyapunov_coefficient,
     zero_hopf_coefficients,
 )
-from .pseudo_arclength import CorrectorFailed
+from .pseudo_arclength import CorrectorFailed, zero_between
 from .shooting_curve import PeriodicOrbitCurve
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
@@ -115,17 +114,21 @@ class Segment:
         return replace(self, surface=replace(surface, curve=replace(curve, loose=COARSE)))
 
     def at(self, part: float) -> SurfacePoint:
-        """The point of the curve at a part of the way.
-
-        Raises
-        ------
-        CorrectorFailed
-        """
+        """The point of the curve at a part of the way."""
         if part == 0.0:
             return self.begin
         guess = self.begin.v + part * (self.end.v - self.begin.v)
         # If the surface is curved, the guess misses it by the square of the step.
         return self.surface.zero(self.begin, guess, self.normal, self.name, self.length)
+
+    def zero(self, function: Callable[[SurfacePoint], float]) -> tuple[float, SurfacePoint]:
+        """Return the part of the way after which a function is zero, and the point there."""
+
+        def value(part: float) -> tuple[float, SurfacePoint]:
+            point = self.at(part)
+            return function(point), point
+
+        return zero_between(value, 1.0)
 
 
 def watched_functions(
@@ -194,7 +197,7 @@ def points_between(
             continue  # it may pass infinity there
         function = _function(kind, name, segment)
         try:
-            part, place = _zero(segment, function)
+            part, place = segment.zero(function)
         except (CorrectorFailed, IntegrationError, ValueError, RuntimeError):
             continue
         if not abs(function(place)) <= _ZERO * max(abs(before[name]), abs(after[name])):
@@ -203,14 +206,6 @@ def points_between(
         if what:
             points.append((part, _point(what, segment, part, place, function)))
     return sorted(points, key=lambda one: one[0])
-
-
-def _zero(segment: Segment, function: Callable[[SurfacePoint], float]) -> tuple[float, SurfacePoint]:
-    """The part of a step after which a function is zero, and the point there, by Brent's method."""
-    part = float(
-        optimize.brentq(lambda x: function(segment.at(x)), 0.0, 1.0, xtol=1e-14, rtol=1e-13, maxiter=60)
-    )
-    return part, segment.at(part)
 
 
 def _named(kind: str, name: str, point: SurfacePoint) -> str:

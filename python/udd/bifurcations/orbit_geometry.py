@@ -83,19 +83,16 @@ def crossings_of(
         flow, u = curve.flow, place.u
         if flow.forcing is not None:
             raise ModelError("a forced cycle's section is its state at the forcing's phase 0: Branch.states")
-        nodes, span = curve.nodes(u), curve.span(u)
-        if curve.symmetric:
-            nodes = np.vstack([nodes, curve.mirror * nodes])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing
             crossings = poincare(
                 flow.with_values(curve.values_at(u)),
                 section,
                 4,
-                state0=flow.full(nodes),
+                state0=flow.full(curve.around(u)),
                 direction=direction,
                 transient=0,
-                t_max=span / curve.pieces,
+                t_max=curve.span(u) / curve.pieces,
                 rtol=1e-10,
                 atol=1e-13,
                 threads=1,

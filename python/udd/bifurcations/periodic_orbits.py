@@ -159,7 +159,7 @@ def periodic_orbit(
     pieces = pieces_for(flow, span)
     run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
     ends = flow.reduced(run.state)
-    mirror = flow.mirror if mirrored and flow.mirror is not None else np.ones(flow.dim)
+    mirror = flow.images[int(mirrored)]
     return _polished(model, flow, ends[:-1], span, mirror, flow.turns(mirror * ends[-1] - ends[0]))
 
 
@@ -218,7 +218,7 @@ def _no_cycle(curve: PeriodicOrbitCurve, u: Floats) -> str:
         return "Newton's method does not converge"
     if flow.forcing is not None:
         return ""
-    rest = np.abs(curve.rate_at(curve.values_at(u), start) * flow.clock / flow.size).max()
+    rest = np.abs(flow.rates(curve.values_at(u), start) * flow.clock / flow.size).max()
     short = curve.span(u) < 1e-6 * flow.clock
     return "the orbit shrinks to a state of rest" if rest < 1e-9 or short else ""
 
@@ -227,9 +227,7 @@ def half_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[str, PeriodicOrbitCur
     """The bifurcation whose orbit closes after half this time, its curve and its nodes; "" for none."""
     flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
     nodes = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))
-    ways = [(np.ones(flow.dim), "period doubling")]
-    if flow.mirror is not None:
-        ways.append((flow.mirror, "symmetry breaking"))
+    ways = zip(flow.images, ("period doubling", "symmetry breaking"), strict=False)
     for mirror, kind in () if curve.symmetric else ways:
         gap = mirror * nodes[-1] - start
         shift = flow.turns(gap)
@@ -308,9 +306,8 @@ def _return_time(flow: FlowMap, model: Model, start: Floats, longest: float) -> 
     count = math.ceil(_FINE * longest / flow.clock)
     times = np.linspace(0.0, longest, count + 1)
     states = flow.reduced(simulate(model, times, start, rtol=1e-10, atol=1e-13, method="auto").state)
-    images = [(np.ones(flow.dim), False)] + ([] if flow.mirror is None else [(flow.mirror, True)])
     returns = []
-    for mirror, mirrored in images:
+    for mirrored, mirror in enumerate(flow.images):
         gap = mirror * states - states[0]
         gap = gap + flow.turns(gap)
         away = np.linalg.norm(gap / flow.size, axis=1)
@@ -326,7 +323,7 @@ def _return_time(flow: FlowMap, model: Model, start: Floats, longest: float) -> 
             # Curved between samples: near the minimum the gap's part across the line is what counts.
             middle = gap[i] / flow.size
             across = middle - line * ((middle @ line) / (line @ line)) if line.any() else middle
-            returns.append((float(np.linalg.norm(across)), float(time), mirrored))
+            returns.append((float(np.linalg.norm(across)), float(time), bool(mirrored)))
     if not returns:
         raise ModelError(f"the run from the guess does not come back within {longest:.4g}")
     best = min(away for away, _, _ in returns)

@@ -206,7 +206,7 @@ def _cubic(flow: FlowMap) -> Polynomials | None:
     probes = flow.size * np.random.default_rng(9).uniform(-2.0, 2.0, (_PROBES, flow.dim))
     try:
         taylor = taylor_at(flow, flow.values, np.zeros(flow.dim))
-        rates = flow.model.rates(np.zeros(_PROBES), flow.full(probes))[:, flow.kept]
+        rates = flow.rates(flow.values, probes, np.zeros(_PROBES))
     except ValueError:
         return None
     if not (np.isfinite(taylor.coefficients).all() and np.isfinite(rates).all()):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
+from scipy import optimize
 
 from udd.errors import IntegrationError
 
@@ -23,6 +24,7 @@ __all__ = [
     "newton_corrector",
     "predictor_corrector_step",
     "tangent_at",
+    "zero_between",
 ]
 
 _ENOUGH = 1e-11  # Size of the last Newton step, in scaled unknowns.
@@ -31,6 +33,9 @@ _MOST = 8  # Newton steps from a good guess.
 _TURN = 0.95  # Least cosine between one tangent and the next.
 _MOVED = 0.25  # Largest distance of the curve from the tangent, in steps.
 _STRAIGHT = 0.995  # Least cosine after which the next step may be longer.
+
+
+Place = TypeVar("Place")
 
 
 class CorrectorFailed(Exception):
@@ -92,12 +97,7 @@ def natural_constraint(u: Floats) -> Floats:
 def newton(
     step_at: Callable[[Floats], Floats], guess: Floats, patience: int = _MOST, longest: float = np.inf
 ) -> Floats:
-    """Return where steps from a guess arrive; no component changes by more than `longest` in one of them.
-
-    Raises
-    ------
-    CorrectorFailed
-    """
+    """Return where steps from a guess arrive; no component changes by more than `longest` in one of them."""
     u, before = guess.copy(), np.inf
     for _ in range(patience):
         try:
@@ -117,12 +117,7 @@ def newton(
 def newton_corrector(
     curve: Curve, guess: Floats, row: Floats, patience: int = _MOST, longest: float = np.inf
 ) -> Floats:
-    """Return the point of the curve in the plane through `guess` with the normal `row`, by Newton's method.
-
-    Raises
-    ------
-    CorrectorFailed
-    """
+    """Return the point of the curve in the plane through `guess` across `row`, by Newton's method."""
 
     def step_at(u: Floats) -> Floats:
         residual, matrix = curve.equations(u)
@@ -132,14 +127,26 @@ def newton_corrector(
 
 
 def corrected_point(curve: Curve, guess: Floats, along: Floats, patience: int = _MOST) -> CurvePoint:
-    """Return the point of the curve across `along`, with the tangent in the same sense.
-
-    Raises
-    ------
-    CorrectorFailed, IntegrationError
-    """
+    """Return the point of the curve across `along`, with the tangent in the same sense."""
     u = newton_corrector(curve, guess, along, patience)
     return CurvePoint(u, tangent_at(curve, u, along))
+
+
+def zero_between(at: Callable[[float], tuple[float, Place]], step: float) -> tuple[float, Place]:
+    """Return the zero of a function between 0 and `step`, and the place there, by Brent's method.
+
+    `at` returns the value at a distance, and the place. ValueError: the value does not change its sign.
+    """
+    places: dict[float, Place] = {}
+
+    def value(distance: float) -> float:
+        number, places[distance] = at(distance)
+        return number
+
+    zero = float(optimize.brentq(value, 0.0, step, xtol=1e-15, rtol=1e-14, maxiter=60))
+    if zero not in places:
+        value(zero)
+    return zero, places[zero]
 
 
 def nearest_of_family(
@@ -149,10 +156,6 @@ def nearest_of_family(
 
     By the method of Gauss and Newton: each step is the shortest of those that solve the linear equations;
     singular values below `singular` times the largest count as zero.
-
-    Raises
-    ------
-    CorrectorFailed
     """
 
     def step_at(u: Floats) -> Floats:

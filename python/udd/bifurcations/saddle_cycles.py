@@ -48,7 +48,7 @@ class SaddleCycle:
         left = np.linalg.inv(right)[place]
         turned = left.real * (right[:, place] @ left).real  # both may have been scaled by the same phase
         norm, state = float(np.linalg.norm(vector)), curve.nodes(u)[0]
-        rate, number = curve.rate_at(values, state) / flow.size, float(numbers[place].real)
+        rate, number = flow.rates(values, state) / flow.size, float(numbers[place].real)
         value, cycle = curve.value(u), curve.solution(u)
         return cls(flow, values, value, state, rate, vector / norm, turned * norm, number, cycle)
 

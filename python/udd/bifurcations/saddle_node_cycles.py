@@ -45,11 +45,7 @@ def saddle_node_on(branch: Branch) -> BifurcationPoint | None:
 
 def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
     """The fold of equilibria near the slowest node of a cycle."""
-    flow, nodes, values = curve.flow, curve.nodes(u), curve.values_at(u)
-    speed = np.linalg.norm(
-        flow.with_values(values).rates(0.0, flow.full(nodes))[:, flow.kept] * flow.clock / flow.size, axis=1
-    )
-    slow = nodes[int(np.argmin(speed))]
+    flow, slow = curve.flow, curve.nodes(u)[int(np.argmin(curve.speeds(u)))]
     rests = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
 
     def equations(y: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Self
 
@@ -99,7 +100,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         """Return the curve with this orbit as the reference, or with the `first` of its nodes alone."""
         if self.flow.forcing is not None:
             return self
-        rates = self._rates_at_nodes(u)
+        rates = self.flow.rates(self.values_at(u), self.nodes(u), self.begins(u))
         if first:
             rates[1:] = 0.0
         return self.anchored_along(self.nodes(u), rates)
@@ -117,10 +118,24 @@ class PeriodicOrbitCurve(SolutionCurve):
             return np.zeros(self.pieces)
         return np.linspace(0.0, self.span(u), self.pieces, endpoint=False)
 
-    def rate_at(self, values: Floats, x: Floats) -> Floats:
-        """The rate at a reduced state."""
-        rate: Floats = self.flow.with_values(values).rates(0.0, self.flow.full(x))[self.flow.kept]
-        return rate
+    def around(self, u: Floats) -> Floats:
+        """Return nodes all around the cycle, those of the mirrored half too."""
+        nodes = self.nodes(u)
+        return np.vstack([nodes, self.mirror * nodes]) if self.symmetric else nodes
+
+    def speeds(self, u: Floats) -> Floats:
+        """Return the speeds (m,) at the nodes, in typical sizes per typical time."""
+        flow = self.flow
+        rates = flow.rates(self.values_at(u), self.nodes(u))
+        speeds: Floats = np.linalg.norm(rates * flow.clock / flow.size, axis=1)
+        return speeds
+
+    @cached_property
+    def _signs(self) -> Floats:
+        """Signs (m, r) of the ends of the pieces: the last one is mirrored."""
+        signs = np.ones((self.pieces, self.flow.dim))
+        signs[-1] = self.mirror
+        return signs
 
     def flight(self, u: Floats) -> SegmentEnds:
         """Return the ends of the pieces, with derivatives by the parameter."""
@@ -143,8 +158,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         m, r, size = self.pieces, self.flow.dim, self.flow.size
         weight = 1.0 / np.sqrt(m)
         nodes, flight = self.nodes(u), self.flight(u)
-        turn = np.ones((m, r))
-        turn[-1] = self.mirror
+        turn = self._signs
         ends = flight.x * turn
         ends[-1] += self.shift
         gaps = (ends - np.roll(nodes, -1, axis=0)) / size
@@ -157,7 +171,7 @@ class PeriodicOrbitCurve(SolutionCurve):
             last = np.zeros(2)
         else:
             # A piece also begins later if the pieces before it take longer.
-            rates = self._rates_at_nodes(u)
+            rates = self.flow.rates(self.values_at(u), self.nodes(u), self.begins(u))
             moved = flight.rate - np.einsum("mij,mj->mi", flight.by_state, rates)
             by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
             period, by_values = forcing.period(self.values_at(u))
@@ -170,19 +184,13 @@ class PeriodicOrbitCurve(SolutionCurve):
 
     def by_second(self, u: Floats, scale: float) -> Floats:
         """The equations' derivatives by the second parameter, in these units of it."""
-        turn = np.ones((self.pieces, self.flow.dim))
-        turn[-1] = self.mirror
+        turn = self._signs
         by_value = self.flight(u).by_parameter[:, :, 1] * turn / self.flow.size * scale
         phase, forcing = 0.0, self.flow.forcing
         if forcing is not None:
             by_values = forcing.period(self.values_at(u))[1]
             phase = -self.share * float(by_values[self.second]) * scale / self.clock
         return np.append(by_value.ravel(), phase)
-
-    def _rates_at_nodes(self, u: Floats) -> Floats:
-        model = self.flow.with_values(self.values_at(u))
-        rates: Floats = model.rates(self.begins(u), self.flow.full(self.nodes(u)))[:, self.flow.kept]
-        return rates
 
     def monodromy(self, u: Floats) -> Floats:
         """The derivative (r, r) of the map from the first node to where the orbit closes."""
@@ -198,8 +206,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         A forced model keeps the whole derivatives (m, r, r), with all multipliers of the stroboscopic map.
         """
         size, flight = self.flow.size, self.flight(u)
-        turn = np.ones((self.pieces, self.flow.dim))
-        turn[-1] = self.mirror
+        turn = self._signs
         scaled = self.flow.scaled(flight.by_state * turn[:, :, None])
         if self.flow.forcing is not None:
             return np.ascontiguousarray(scaled)
@@ -251,7 +258,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         left eigenvector of the multiplier 1 across the flow.
         """
         closing = self.flow.scaled(self.monodromy(u))
-        rate = self.rate_at(self.values_at(u), self.nodes(u)[0]) * self.clock / self.flow.size
+        rate = self.flow.rates(self.values_at(u), self.nodes(u)[0]) * self.clock / self.flow.size
         left, sizes, _ = np.linalg.svd(np.column_stack([closing - np.eye(self.flow.dim), rate]))
         return left, sizes
 

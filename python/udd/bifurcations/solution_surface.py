@@ -93,12 +93,7 @@ class SolutionSurface:
         return self.curve.with_second(self.second, float(v[-1] * self.scale))
 
     def corrected(self, guess: Floats, base: SurfacePoint) -> SurfacePoint:
-        """The point of the surface across another one's plane through a guess.
-
-        Raises
-        ------
-        CorrectorFailed
-        """
+        """The point of the surface across another one's plane through a guess."""
         first, second = base.plane
 
         def step_at(v: Floats) -> Floats:

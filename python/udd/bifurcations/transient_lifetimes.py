@@ -174,4 +174,4 @@ def _points(flow: FlowMap, attractor: Equilibrium | PeriodicOrbit) -> Floats:
     if isinstance(attractor, PeriodicOrbit):
         own = attractor.trajectory(_ROUND).state
     x = flow.reduced(own)
-    return np.vstack([x] if flow.mirror is None else [x, flow.mirror * x]) / flow.size
+    return np.vstack([signs * x for signs in flow.images]) / flow.size
