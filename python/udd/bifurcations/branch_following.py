@@ -21,7 +21,6 @@ from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import rounding_of
 from .flow_map import Floats
 from .nonsmooth import corner_ahead
-from .periodic_orbits import pieces_for
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
@@ -127,18 +126,16 @@ class _Way(BranchTrace):
             self.places.append(Station(curve, there, after, arclength))
             self.points, self.end = _once(self.points), CLOSED
             return here, step
-        if isinstance(curve, PeriodicOrbitCurve):
-            if curve.period(there.u) > limits.period:
-                self.places.append(Station(curve, there, after, arclength))
-                self.end = f"the period exceeds {limits.period:.6g}"
-                return here, step
-            # A new plane for the phase, and a finer mesh where the orbit has grown long.
-            curve, there = _prepared(curve, there)
-            if not isinstance(curve, FamilyCurve):
-                after = replace(after, fold=float(there.tangent[-1]))
+        if curve.period(there.u) > limits.period:
+            self.places.append(Station(curve, there, after, arclength))
+            self.end = f"the period exceeds {limits.period:.6g}"
+            return here, step
+        curve, there = curve.prepared(there)
+        if not isinstance(curve, FamilyCurve):
+            after = replace(after, fold=float(there.tangent[-1]))
         self.places.append(Station(curve, there, after, arclength))
-        if isinstance(curve, PeriodicOrbitCurve) and (near := _connection(self)) is not None:
-            self.end = f"a connection near {near:.13g}: the period grows without bound"
+        if (value := _connection(self)) is not None:
+            self.end = f"a connection near {value:.13g}: the period grows without bound"
         return self.places[-1], step
 
     def locate(self, here: Station, gone: float, after: TestFunctions) -> None:
@@ -257,39 +254,12 @@ class _Way(BranchTrace):
         return Station(curve, leaving, after, arclength)
 
 
-def _prepared(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, CurvePoint]:
-    """The curve with its phase fixed here, and cut into enough pieces; the tangent in its new equations."""
-    flow, m = curve.flow, curve.pieces
-    wanted = pieces_for(flow, curve.span(place.u))
-    if 2 * wanted > 3 * m:
-        times = -(-wanted // m)
-        nodes, values = [curve.nodes(place.u)], curve.values_at(place.u)
-        share, begins = np.full(m, curve.span(place.u) / (m * times)), curve.begins(place.u)
-        for k in range(times - 1):
-            nodes.append(flow.fly(values, nodes[-1], share, t=begins + k * share).x)
-        fine = replace(curve, pieces=m * times)
-        packed = np.stack(nodes, axis=1).reshape(m * times, flow.dim)
-        u = fine.pack(packed, curve.span(place.u), curve.value(place.u))
-        along = np.zeros((m, times, flow.dim))
-        along[:, 0] = place.tangent[:-2].reshape(m, flow.dim)
-        row = np.append(along.ravel(), place.tangent[-2:])
-        fine = fine.anchored(u)
-        return fine, CurvePoint(u, tangent_at(fine, u, row))
-    curve = curve.anchored(place.u)
-    return curve, CurvePoint(place.u, tangent_at(curve, place.u, place.tangent))
-
-
 def _connection(way: BranchTrace) -> float | None:
     """Return the parameter that has converged while the period goes on growing, or None."""
     if len(way.places) < _WATCHED:
         return None
-    last = [
-        (curve, place.u)
-        for curve, place, _, _ in way.places[-_WATCHED:]
-        if isinstance(curve, PeriodicOrbitCurve)
-    ]
-    values = [curve.value(u) for curve, u in last]
-    spans = [curve.span(u) for curve, u in last]
+    values = [curve.value(place.u) for curve, place, _, _ in way.places[-_WATCHED:]]
+    spans = [curve.period(place.u) for curve, place, _, _ in way.places[-_WATCHED:]]
     still = max(values) - min(values) < _CONVERGED * max(abs(value) for value in values)
     growing = all(a < b for a, b in pairwise(spans)) and spans[-1] > _GROWN * spans[0]
     return values[-1] if still and growing else None

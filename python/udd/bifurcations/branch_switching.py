@@ -13,7 +13,6 @@ from .branch import AnyCurve, BifurcationPoint
 from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve, expansion
 from .flow_map import Floats
-from .periodic_orbits import pieces_for
 from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
 
@@ -67,10 +66,8 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
             if nearer is None or _nothing_between(new, point, begins, nearer, begin):
                 break
             begin, size = nearer, 0.5 * size
-        if isinstance(new, PeriodicOrbitCurve):
-            new = new.anchored(begin.u)
-            begin = CurvePoint(begin.u, tangent_at(new, begin.u, row))
-        return new, begin, size
+        new = new.anchored(begin.u)
+        return new, CurvePoint(begin.u, tangent_at(new, begin.u, row)), size
     where = f"the {point.kind} at {point.parameter} = {point.value:.10g}"
     raise ModelError(
         f"the branch born at {where} is not found at amplitudes of {0.03 * amplitude:.2g} to "
@@ -133,7 +130,7 @@ def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbi
     turning = np.flatnonzero(numbers.imag > 0)
     k = turning[np.argmin(np.abs(numbers[turning].real))]
     period = 2.0 * np.pi / float(numbers[k].imag)
-    pieces = max(4, pieces_for(flow, period))
+    pieces = max(4, flow.pieces_for(period))
     phases = np.exp(2j * np.pi * np.arange(pieces) / pieces)
     away = np.outer(phases, vectors[:, k]).real
     ones, rest = np.ones(flow.dim), np.tile(x, (pieces, 1))

@@ -22,7 +22,6 @@ from .connecting_orbits import Connection, found_by
 from .equilibrium_search import equilibria, refined
 from .flow_map import Floats, FlowMap, flow_of
 from .invariant_manifolds import Eigendirection, direction_alone
-from .periodic_orbits import pieces_for
 from .solutions import FoundList
 
 __all__ = ["Connections", "connections"]
@@ -374,7 +373,7 @@ class _Manifold:
 
     def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
         flow, step = self.flow, self.flow.clock / _FINE
-        pieces = pieces_for(flow, last * step)
+        pieces = flow.pieces_for(last * step)
         every = max(1, last // pieces)
         where = np.arange(last % every, last + 1, every)
         nodes, span = curve.path[where], float((len(where) - 1) * every * step)

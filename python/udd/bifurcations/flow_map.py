@@ -113,6 +113,10 @@ class FlowMap:
         result: Floats = by_state * self.size / self.size[:, None]
         return result
 
+    def pieces_for(self, span: float) -> int:
+        """Return into how many pieces an orbit of this length is cut."""
+        return max(3, math.ceil(2.0 * span / self.clock))
+
     def fly(
         self,
         values: Floats,

@@ -31,7 +31,7 @@ from .solutions import PeriodicOrbit
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["closed", "flown", "half_of", "periodic_orbit", "pieces_for"]
+__all__ = ["closed", "flown", "half_of", "periodic_orbit"]
 
 _FINE = 64  # Samples in a typical time.
 _CLOSE = 3e-2  # Distance of a return that can be that of a cycle, in typical sizes.
@@ -156,16 +156,11 @@ def periodic_orbit(
     if forcing is None:
         span, mirrored = _return_time(flow, free, start, limit)
     require_memory("pieces of a cycle", 2.0 * span / flow.clock, flow.dim)
-    pieces = pieces_for(flow, span)
+    pieces = flow.pieces_for(span)
     run = simulate(free, np.linspace(0.0, span, pieces + 1), start, rtol=1e-11, atol=1e-14, method="auto")
     ends = flow.reduced(run.state)
     mirror = flow.images[int(mirrored)]
     return _polished(model, flow, ends[:-1], span, mirror, flow.turns(mirror * ends[-1] - ends[0]))
-
-
-def pieces_for(flow: FlowMap, span: float) -> int:
-    """Into how many pieces an orbit of this length is cut."""
-    return max(3, math.ceil(2.0 * span / flow.clock))
 
 
 def _polished(
@@ -226,7 +221,7 @@ def _no_cycle(curve: PeriodicOrbitCurve, u: Floats) -> str:
 def half_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[str, PeriodicOrbitCurve, Floats]:
     """The bifurcation whose orbit closes after half this time, its curve and its nodes; "" for none."""
     flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
-    nodes = flown(flow, curve.values_at(u), start, half, pieces_for(flow, half))
+    nodes = flown(flow, curve.values_at(u), start, half, flow.pieces_for(half))
     ways = zip(flow.images, ("period doubling", "symmetry breaking"), strict=False)
     for mirror, kind in () if curve.symmetric else ways:
         gap = mirror * nodes[-1] - start
@@ -271,7 +266,7 @@ def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve,
         share = span / parts
         if extent(share) < _WHOLE * extent(span):
             continue  # it has hardly left its start, where it is slow
-        nodes = flown(flow, values, start, share, pieces_for(flow, share))
+        nodes = flown(flow, values, start, share, flow.pieces_for(share))
         try:
             found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
         except ModelError:

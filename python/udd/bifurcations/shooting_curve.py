@@ -16,7 +16,7 @@ from .condensation import CyclicEquations
 from .error_bounds import COARSE, rounding_of
 from .floquet_multipliers import Multipliers, multipliers_at
 from .flow_map import Floats, SegmentEnds
-from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector
+from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
 from .solution_curve import HELD, SolutionCurve
 from .solutions import PeriodicOrbit
 
@@ -117,6 +117,25 @@ class PeriodicOrbitCurve(SolutionCurve):
         if self.flow.forcing is None:
             return np.zeros(self.pieces)
         return np.linspace(0.0, self.span(u), self.pieces, endpoint=False)
+
+    def prepared(self, place: CurvePoint) -> tuple[Self, CurvePoint]:
+        """Return the curve with its phase fixed here, cut into enough pieces, and the place on it."""
+        flow, m, u, row = self.flow, self.pieces, place.u, place.tangent
+        fine, wanted = self, flow.pieces_for(self.span(u))
+        if 2 * wanted > 3 * m:
+            times = -(-wanted // m)
+            nodes, values = [self.nodes(u)], self.values_at(u)
+            share, begins = np.full(m, self.span(u) / (m * times)), self.begins(u)
+            for k in range(times - 1):
+                nodes.append(flow.fly(values, nodes[-1], share, t=begins + k * share).x)
+            fine = replace(self, pieces=m * times)
+            packed = np.stack(nodes, axis=1).reshape(m * times, flow.dim)
+            u = fine.pack(packed, self.span(u), self.value(u))
+            along = np.zeros((m, times, flow.dim))
+            along[:, 0] = row[:-2].reshape(m, flow.dim)
+            row = np.append(along.ravel(), row[-2:])
+        fine = fine.anchored(u)
+        return fine, CurvePoint(u, tangent_at(fine, u, row))
 
     def around(self, u: Floats) -> Floats:
         """Return nodes all around the cycle, those of the mirrored half too."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from .flow_map import Floats, FlowMap
+from .pseudo_arclength import CurvePoint
 
 __all__ = ["HELD", "SolutionCurve"]
 
@@ -59,3 +60,7 @@ class SolutionCurve:
     def anchored(self, u: Floats) -> Self:
         """Return the curve with this solution as the reference of its phase, if it has a phase."""
         return self
+
+    def prepared(self, place: CurvePoint) -> tuple[Self, CurvePoint]:
+        """Return the curve for the next step from a place, and the place with its tangent there."""
+        return self, place
