@@ -86,3 +86,14 @@ def test_what_it_does_not_serve_is_told() -> None:
     family = udd.continuation(udd.periodic_orbit(circle, [1.0, 0.0]), "period", (6.6, 7.0))
     with pytest.raises(ModelError, match="over a parameter of a model"):
         udd.cycle_connections(family, saddle_of(model))
+
+
+def test_a_passage_at_another_part_of_the_cycle_counts() -> None:
+    rates = ["y", "(1 - z)*x - lam*y", "-0.4*z + x^2"]
+    model = udd.Model(["x", "y", "z"], rates, {"lam": 1.2})
+    branch = branch_of(model, "lam", (0.3, 2.0), 20.0)
+    # The manifold passes the mirror image of the cycle in its last fifth, and leaves before a whole round.
+    (connection,) = udd.cycle_connections(branch, saddle_of(model))
+    # By shooting to the nearest of 288 states of the cycle.
+    assert connection.value == pytest.approx(1.1967406163676289, abs=connection.error + 2e-14)
+    assert 0.0 < connection.error < 1e-12

@@ -26,8 +26,8 @@ __all__ = ["CycleConnection", "cycle_connections"]
 
 _AWAY = 1e-6  # Distance from the equilibrium, in typical sizes, within which the manifold is straight.
 _FINE = 24  # Samples in a typical time.
-_NEAR = 1.0  # Largest distance of a passage in the plane, in typical sizes.
-_REACH = 3.0  # The same just after the orbit has crossed the plane.
+_NEAR = 1.0  # Largest distance of a passage, in typical sizes.
+_PARTS = 8  # Parts of a piece of the cycle, with which the manifold is compared.
 _LEFT = 0.5  # Distance at which the manifold has left the equilibrium.
 _FAR = 30.0  # Typical sizes, beyond which nothing comes back.
 _LEAVES = 80.0  # Most typical times from the equilibrium to the cycle.
@@ -123,9 +123,10 @@ def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleCon
 
 @dataclass(frozen=True)
 class _Passage:
-    """When a manifold first comes to a cycle of the branch, and on which side of its other manifold."""
+    """The first passage of a manifold near a cycle: at which part of the period, when, and on which side."""
 
     saddle: SaddleCycle
+    part: float
     t: float
     height: float
 
@@ -160,21 +161,33 @@ class _Search:
 
     def _passage(self, saddle: SaddleCycle) -> _Passage | None:
         """Return when the manifold first comes to the cycle, and on which side."""
-        image, start = saddle.mirrored(self.mirror), self._start(saddle.values, _AWAY)
-        if start is None:
+        begin = self._start(saddle.values, _AWAY)
+        if begin is None:
             return None
-        step, before, left = self.time * self.flow.clock / _FINE, 0.0, False
-        for k, x in enumerate(self._run(saddle.values, start, step), 1):
-            if not image.distance(x) < _FAR:
+        start = begin[0]
+        around = self.mirror * self._around(saddle)
+        step = self.time * self.flow.clock / _FINE
+        last, before, left, nearest = np.inf, np.inf, False, 0
+        for k, x in enumerate(self._run(saddle.values, start, step)):
+            gaps = np.linalg.norm((x - around) / self.flow.size, axis=1)
+            away = float(gaps.min())
+            if not away < _FAR:
                 return None
             left = left or bool(np.linalg.norm((x - start) / self.flow.size) > _LEFT)
-            ahead = self.time * float(image.ahead(x))
-            if left and before < 0.0 <= ahead and image.distance(x) < _REACH:
-                landed = image.landed(x[np.newaxis])[0]
-                if image.distance(landed) < _NEAR:
-                    return _Passage(saddle, float(k * step), float(image.height(landed)))
-            before = ahead
+            if left and before > last < away and last < _NEAR:
+                part, t = nearest / len(around), float(k * step)
+                return _Passage(saddle, part, t, self._arrival(saddle, part, t, 0, Accuracy(_AWAY))[0])
+            before, last, nearest = last, away, int(np.argmin(gaps))
         return None
+
+    def _around(self, saddle: SaddleCycle) -> Floats:
+        """Return states all around a cycle, in their order."""
+        assert saddle.cycle._solved is not None
+        curve, u = saddle.cycle._solved
+        nodes = curve.around(u)
+        spans = np.arange(_PARTS) * (curve.span(u) / curve.pieces / _PARTS)
+        rows = np.repeat(nodes, _PARTS, axis=0)
+        return self.flow.fly_each(saddle.values, rows, np.tile(spans, len(nodes)))
 
     def _run(self, values: Floats, x: Floats, step: float) -> Iterator[Floats]:
         """Yield the states after each step of time, a typical time of them in one call."""
@@ -184,21 +197,25 @@ class _Search:
             yield from states
             x = states[-1]
 
-    def _start(self, values: Floats, away: float) -> Floats | None:
+    def _start(self, values: Floats, away: float) -> tuple[Floats, float] | None:
+        """Return a state on the manifold, and when an orbit from the usual distance comes to it."""
         rest = refined(self.flow, values, self.guess)
         if rest is None:
             return None
         way = direction_alone(self.flow, values, rest, self.time)
         if way is None or way.number == 0.0:
             return None
-        return np.asarray(rest + self.flow.size * self.sign * away * way.vector)
+        x = np.asarray(rest + self.flow.size * self.sign * away * way.vector)
+        return x, float(np.log(away / _AWAY)) / way.number
 
-    def _arrival(self, saddle: SaddleCycle, t: float, rounds: int, accuracy: Accuracy) -> tuple[float, float]:
-        """Return the height and the distance from a cycle, some rounds after a time."""
-        image, start = saddle.mirrored(self.mirror), self._start(saddle.values, accuracy.away)
-        if start is None:
+    def _arrival(
+        self, saddle: SaddleCycle, part: float, t: float, rounds: int, accuracy: Accuracy
+    ) -> tuple[float, float]:
+        """Return the height and the distance from a part of a cycle, some rounds after a time."""
+        image, begin = saddle.moved(part).mirrored(self.mirror), self._start(saddle.values, accuracy.away)
+        if begin is None:
             raise ModelError("the equilibrium is no saddle there")
-        x, span = start[np.newaxis], t + self.time * rounds * saddle.period
+        x, span = begin[0][np.newaxis], t - begin[1] + self.time * rounds * saddle.period
         pieces = max(1, int(np.ceil(abs(span) / self.flow.clock)))
         for _ in range(pieces):
             x = self.flow.fly_each(saddle.values, x, np.array([span / pieces]), accuracy.loose)
@@ -208,16 +225,17 @@ class _Search:
     def _located(self, a: _Passage, b: _Passage) -> CycleConnection:
         """Return the connection between two passages, by more and more rounds about the cycle."""
         first = Accuracy(_AWAY)
-        like, t = a.saddle, a.t if abs(a.height) < abs(b.height) else b.t
+        nearer = a if abs(a.height) < abs(b.height) else b
+        like, part, t = nearer.saddle, nearer.part, nearer.t
 
         def saddle(value: float) -> SaddleCycle:
             return saddle_at(self.branch, value, like, self.time > 0.0)
 
         def height(value: float) -> float:
-            return self._arrival(saddle(value), t, 0, first)[0]
+            return self._arrival(saddle(value), part, t, 0, first)[0]
 
         def solve(x: Floats, rounds: int, step: float, accuracy: Accuracy) -> Floats:
-            return secant(lambda y: (self._arrival(saddle(y[0]), t, rounds, accuracy)[0], y), x, step)
+            return secant(lambda y: (self._arrival(saddle(y[0]), part, t, rounds, accuracy)[0], y), x, step)
 
         low, high = a.saddle.value, b.saddle.value
         if height(low) * height(high) >= 0.0:
@@ -226,7 +244,7 @@ class _Search:
         x, error, rounds = converge(solve, np.array([begin]), abs(high - low), first)
         value = float(x[0])
         there = saddle(value)
-        if not self._arrival(there, t, rounds, first)[1] < _ONTO:
+        if not self._arrival(there, part, t, rounds, first)[1] < _ONTO:
             raise ModelError("the orbit does not come to the cycle")
         rest = equilibrium_at(self.flow, there.values, self.guess)
         kind = "equilibrium to cycle" if self.time > 0.0 else "cycle to equilibrium"

@@ -63,6 +63,26 @@ class SaddleCycle:
         state, rate = mirror * self.state, mirror * self.rate
         return replace(self, state=state, rate=rate, right=mirror * self.right, left=mirror * self.left)
 
+    def moved(self, part: float) -> SaddleCycle:
+        """Return it at the node nearest to a part of the period, with the vectors carried along there."""
+        assert self.cycle._solved is not None
+        curve, u = self.cycle._solved
+        nodes, m = curve.around(u), curve.pieces
+        last = len(nodes)
+        pieces = self.flow.scaled(curve.flight(u).by_state)
+        if last > m:
+            pieces = np.concatenate([pieces, curve.mirror[:, None] * pieces * curve.mirror])
+        k = round(part * last) % last
+        right, left = self.right, self.left
+        for piece in pieces[:k]:
+            right = piece @ right
+        # The left vector is that at the end, carried back: so it is accurate.
+        for piece in pieces[: k - 1 if k else None : -1]:
+            left = left @ piece
+        right = right / np.linalg.norm(right)
+        rate = self.flow.rates(self.values, nodes[k]) / self.flow.size
+        return replace(self, state=nodes[k], rate=rate, right=right, left=left / (left @ right))
+
     @property
     def period(self) -> float:
         """The cycle's."""
