@@ -96,7 +96,7 @@ def _judge(result: MachineScore, found: udd.Discovery, sigma: dict[str, float]) 
     _value, result.low, result.high = found.ratio
     fit = found.fit
     result.scatter = float(fit.scatter)
-    told = [one.told / sigma[one.name] for one in found.noise if one.name in sigma]
+    told = [one.frame_noise / sigma[one.name] for one in found.noise if one.name in sigma]
     result.noise = float(np.median(told))
 
 
