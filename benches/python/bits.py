@@ -87,7 +87,10 @@ def _runs() -> Iterator[tuple[str, Callable[[], list[object]]]]:
     disks = np.column_stack(
         [rng.normal(size=(100, 2)) * [2, 0.01], 0.02 * rng.normal(size=100), np.zeros(100)]
     )
-    yield "ensemble, disk", lambda: [udd.ensemble(udd.Disk(0.039), [0, 5, 10], disks).state]
+    yield (
+        "ensemble, disk",
+        lambda: [udd.ensemble(udd.Disk(0.039), [0, 5, 10], disks, method="dopri5").state],
+    )
 
 
 def _chaos() -> Iterator[tuple[str, Callable[[], list[object]]]]:
@@ -128,7 +131,7 @@ def _attractors() -> Iterator[tuple[str, Callable[[], list[object]]]]:
 
 
 def _loop() -> Iterator[tuple[str, Callable[[], list[object]]]]:
-    run = udd.simulate(GRIPPING, np.arange(0, 20, 0.04), [0, 0.001, 0.04, 0])
+    run = udd.simulate(GRIPPING, np.arange(0, 20, 0.04), [0, 0.001, 0.04, 0], method="dopri5")
     seen = run.state[:, 1:] + np.random.default_rng(2).normal(size=(len(run.t), 3)) * [3e-4, 3e-4, 5e-3]
     table = udd.Measurement(run.t, seen).with_meta(W=0.039, R=0.08)
 
