@@ -233,8 +233,10 @@ class _Writer:
 
     def _object(self, value: Any) -> dict[str, Any]:
         if isinstance(value, FormulaModel) and value.records:
-            own = {"equations": model_to_dict(value), "record": value.record}
-            return {"driven": own | {"records": self.value([dict(record) for record in value.records])}}
+            model_entries = {"equations": model_to_dict(value), "record": value.record}
+            return {
+                "driven": model_entries | {"records": self.value([dict(record) for record in value.records])}
+            }
         if isinstance(value, Model):
             return {"model": model_to_dict(value)}
         if isinstance(value, Effect):
@@ -248,10 +250,10 @@ class _Writer:
             raise ModelError(f"a result with a {name} in it cannot be saved")
         entries = {attribute.name: self.value(getattr(value, attribute.name)) for attribute in fields(value)}
         # The doubts are those of the fit before its errors were widened: they cannot be computed again.
-        more = (
+        signals = (
             {"doubts": self.value(value.doubts)} if isinstance(value, Fit) and "doubts" in vars(value) else {}
         )
-        return {"type": name, "fields": entries | more}
+        return {"type": name, "fields": entries | signals}
 
 
 _hints = functools.cache(get_type_hints)

@@ -71,9 +71,9 @@ class MemoryLimit:
 
     def exceeded(self) -> UddError:
         """Return the error of data that are too large."""
-        more = re.sub(r"e\+0*", "e", f" (limit={10.0 * min(self.limit, 1e300):.0e} allows more)")
+        advice = re.sub(r"e\+0*", "e", f" (limit={10.0 * min(self.limit, 1e300):.0e} allows more)")
         said = f"the data take more than the limit of {in_bytes(self.limit)}"
-        return self.error(said + more * self.is_argument)
+        return self.error(said + advice * self.is_argument)
 
 
 def in_bytes(size: float) -> str:

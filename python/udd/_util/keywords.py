@@ -63,9 +63,9 @@ def with_defaults(function: str, defaults: Options, given: Mapping[str, Any]) ->
     for name in given:
         if name not in defaults:
             code = sys._getframe(1).f_code  # of the function
-            own = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+            parameter_names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
             raise TypeError(
                 f"{function}() got an unexpected keyword argument {name!r}; its arguments are "
-                f"{', '.join([*own, *defaults])}"
+                f"{', '.join([*parameter_names, *defaults])}"
             )
     return cast(Options, {**defaults, **given})

@@ -41,10 +41,10 @@ def dataset(
     """
 
     def labelled(
-        name: str, values: NDArray[Any], own: Sequence[str]
+        name: str, values: NDArray[Any], dimensions: Sequence[str]
     ) -> tuple[Sequence[str], NDArray[Any], dict[str, str]]:
         unit = units.get(name, "")
-        return own, np.asarray(values), {"units": unit} if unit else {}
+        return dimensions, np.asarray(values), {"units": unit} if unit else {}
 
     labelled_data: xr.Dataset = require_xarray().Dataset(
         {name: labelled(name, values, dims) for name, values in columns.items()},

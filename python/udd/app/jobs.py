@@ -68,8 +68,8 @@ class Job:
 
     def file(self, name: str) -> Path | None:
         """One of the files that it made, by a name that it gave."""
-        known = {part["name"] for part in self.answer.get("parts", ())}
-        return self.folder / "out" / name if name in known else None
+        part_names = {part["name"] for part in self.answer.get("parts", ())}
+        return self.folder / "out" / name if name in part_names else None
 
 
 class Jobs:

@@ -81,10 +81,10 @@ def network_address() -> str | None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # nothing is sent: the system only chooses an interface
-            found = str(probe.getsockname()[0])
+            address = str(probe.getsockname()[0])
         except OSError:
             return None
-    return None if ipaddress.ip_address(found).is_loopback else found
+    return None if ipaddress.ip_address(address).is_loopback else address
 
 
 def _own_name() -> str:

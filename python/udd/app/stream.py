@@ -150,10 +150,10 @@ class Page:
 
         async def answers() -> AsyncIterator[dict[str, Any] | bytes]:
             for count in maps.VALUES:
-                found = await self._calculators["maps"].ask(maps.diagram, start, low, high, count)
-                yield wire.diagram(generation, found)
-                found = await self._calculators["maps"].ask(maps.exponents, start, low, high, count)
-                yield wire.exponents(generation, found)
+                answer = await self._calculators["maps"].ask(maps.diagram, start, low, high, count)
+                yield wire.diagram(generation, answer)
+                answer = await self._calculators["maps"].ask(maps.exponents, start, low, high, count)
+                yield wire.exponents(generation, answer)
             yield {"type": "diagram", "generation": generation}
 
         self._begin(said, generation, answers())

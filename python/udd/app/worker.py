@@ -51,8 +51,8 @@ def main() -> None:
             warnings.simplefilter("always", UserWarning)
             OUT.mkdir()
             done = JOBS[asked["kind"]](asked, tell)
-        told = [w.message for w in warned if issubclass(w.category, UserWarning)]
-        done["warnings"] = [_sentence(message, asked.get("file", "")) for message in told]
+        messages = [w.message for w in warned if issubclass(w.category, UserWarning)]
+        done["warnings"] = [_sentence(message, asked.get("file", "")) for message in messages]
         tell({"done": done})
     except UddError as error:
         tell(

@@ -33,8 +33,8 @@ def basin_fractions(ends: NDArray[np.int32], count: int) -> tuple[Floats, Floats
     variance is that between neighbours (strata collapsed two by two along each axis): where neighbours have
     nothing in common it is the binomial one; where the basins are large only the cells at their edges count.
     """
-    known = ends >= 0
-    total = int(known.sum())
+    is_known = ends >= 0
+    total = int(is_known.sum())
     if not total:
         return np.full(count, np.nan), np.full(count, np.nan)
     groups = _groups(ends)
@@ -107,8 +107,8 @@ def uncertainty(ends: NDArray[np.int32]) -> UncertaintyExponent:
     draws = np.random.default_rng(0).integers(0, pairs.shape[1], (_REPEATS, pairs.shape[1]))
     again = np.array([_slope(stride, pairs[:, draw], fitted)[0] for draw in draws])
     again = again[np.isfinite(again)]
-    told = np.isfinite(exponent) and len(again) > _REPEATS // 2
-    error = float(np.hypot(again.std(ddof=1), misfit)) if told else float("nan")
+    is_determined = np.isfinite(exponent) and len(again) > _REPEATS // 2
+    error = float(np.hypot(again.std(ddof=1), misfit)) if is_determined else float("nan")
     return UncertaintyExponent(stride, fraction, exponent, error, fitted)
 
 
@@ -117,16 +117,16 @@ def _per_block(ends: NDArray[np.int32], stride: int) -> NDArray[np.int64]:
     block = np.zeros(ends.shape, dtype=np.int64)
     along = round(_BLOCKS ** (1 / ends.ndim))
     for axis, n in enumerate(ends.shape):
-        own = np.arange(n) * along // n
-        block = block * along + own.reshape([-1 if a == axis else 1 for a in range(ends.ndim)])
+        place = np.arange(n) * along // n
+        block = block * along + place.reshape([-1 if a == axis else 1 for a in range(ends.ndim)])
     result = np.zeros((along**ends.ndim, 2), dtype=np.int64)
     for axis, n in enumerate(ends.shape):
         one = np.take(ends, np.arange(n - stride), axis)
         other = np.take(ends, np.arange(stride, n), axis)
         where = np.take(block, np.arange(n - stride), axis)
-        both = (one >= 0) & (other >= 0)
-        result[:, 0] += np.bincount(where[both & (one != other)], minlength=len(result))
-        result[:, 1] += np.bincount(where[both], minlength=len(result))
+        is_pair = (one >= 0) & (other >= 0)
+        result[:, 0] += np.bincount(where[is_pair & (one != other)], minlength=len(result))
+        result[:, 1] += np.bincount(where[is_pair], minlength=len(result))
     return result
 
 

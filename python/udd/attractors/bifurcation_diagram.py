@@ -199,8 +199,10 @@ def bifurcation(
 
     def work(these: NDArray[np.intp], states: Floats) -> None:
         if attractors:
-            one, own = follow(runner, judge, rows[these], of_job[these], states, transient, n, longest)
-            verdicts.put(these, own)
+            one, job_verdicts = follow(
+                runner, judge, rows[these], of_job[these], states, transient, n, longest
+            )
+            verdicts.put(these, job_verdicts)
         else:
             one = runner(rows[these], states, transient, n)
         put(crossings, these, one)
@@ -250,9 +252,9 @@ def bifurcation(
     for k, name in enumerate(model.state_names):
         coords[f"start_{name}"] = ("start", begin[:, k], of_state(model, name, "at the start"))
     told_of = {"parameter": parameter, "n": n, "transient": transient, "max_extension": extension}
-    more = {"perturbation": nudge, "match_distance": reach, "complete": int(not stopped)}
+    attributes = {"perturbation": nudge, "match_distance": reach, "complete": int(not stopped)}
     made: xr.Dataset = xarray.Dataset(
-        data, coords, of_result(runner, "bifurcation diagram", {**told_of, **more})
+        data, coords, of_result(runner, "bifurcation diagram", {**told_of, **attributes})
     )
     if stopped:
         left = int((crossings.outcome == INTERRUPTED).sum())

@@ -22,10 +22,10 @@ class AttractorCatalogue:
     def places(self, crossings: Crossings, verdicts: Classification) -> NDArray[np.int32]:
         """Return the place of each job's attractor, or -1; add new attractors."""
         result = np.full(len(crossings.outcome), -1, dtype=np.int32)
-        known = decided(crossings, verdicts)
-        for period in np.unique(verdicts.period[known]).tolist():
+        is_decided = decided(crossings, verdicts)
+        for period in np.unique(verdicts.period[is_decided]).tolist():
             for rest in (False, True):
-                jobs = np.flatnonzero(known & (verdicts.period == period) & (verdicts.rest == rest))
+                jobs = np.flatnonzero(is_decided & (verdicts.period == period) & (verdicts.rest == rest))
                 if len(jobs):
                     self._place(crossings, verdicts, jobs, result)
         return result

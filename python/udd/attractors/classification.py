@@ -70,9 +70,9 @@ class MotionClassifier:
             elif test(state, attracts=self.parameter is None) is not None:
                 rest[k] = True
                 equilibria.append(place)
-            elif (near := equilibrium_near(model, state, kept, 0.0)) is not None:
+            elif (equilibrium := equilibrium_near(model, state, kept, 0.0)) is not None:
                 there = state.copy()
-                there[kept] = near.state
+                there[kept] = equilibrium.state
                 off = np.abs(self.coordinates(there) - place).max(initial=0.0)
                 passes[k] = off < 20.0 * self.tight.settled
         return rest, passes
@@ -126,8 +126,10 @@ def put(found: Crossings, rows: NDArray[np.intp], other: Crossings) -> None:
 
 def decided(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
     """Return a mask of the jobs that have ended on an attractor."""
-    known: NDArray[np.bool_] = ((found.outcome == FINISHED) & (verdicts.period != SETTLING)) | verdicts.rest
-    return known
+    is_decided: NDArray[np.bool_] = (
+        (found.outcome == FINISHED) & (verdicts.period != SETTLING)
+    ) | verdicts.rest
+    return is_decided
 
 
 def followed_on(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
@@ -177,8 +179,8 @@ def again(
     n: int,
 ) -> bool:
     """Follow some jobs on from where they are; whether all were finished. Others stay as they were."""
-    more = runner(rows[jobs], crossings.end[jobs], skip, n)
-    done = more.outcome != INTERRUPTED
-    put(crossings, jobs[done], more.only(done))
-    verdicts.put(jobs[done], judge(more, values[jobs]).only(done))
+    continued = runner(rows[jobs], crossings.end[jobs], skip, n)
+    done = continued.outcome != INTERRUPTED
+    put(crossings, jobs[done], continued.only(done))
+    verdicts.put(jobs[done], judge(continued, values[jobs]).only(done))
     return bool(done.all())

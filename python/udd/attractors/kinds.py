@@ -41,11 +41,11 @@ def kinds_of(
     neither grow nor shrink. It is a cycle, of more rounds than can be counted, if a single direction does so.
     """
     kind = np.zeros(len(values), dtype=np.int8)
-    known = decided(crossings, verdicts)
+    is_decided = decided(crossings, verdicts)
     kind[np.isin(crossings.outcome, _LEFT)] = MOTIONS.index("left")
-    kind[known & (verdicts.period > 0)] = MOTIONS.index("cycle")
-    kind[known & (verdicts.period == APERIODIC)] = MOTIONS.index("aperiodic")
-    rest = np.flatnonzero(known & verdicts.rest)
+    kind[is_decided & (verdicts.period > 0)] = MOTIONS.index("cycle")
+    kind[is_decided & (verdicts.period == APERIODIC)] = MOTIONS.index("aperiodic")
+    rest = np.flatnonzero(is_decided & verdicts.rest)
     for job in rest.tolist():
         state = judge.attractor(crossings, verdicts, job).states[0]
         turns = _turns(judge, state, float(values[job]))

@@ -60,10 +60,10 @@ def tell(
 ) -> DiagramLabels:
     """Tell the attractors apart, value by value; `places` (paths, starts, values) numbers the jobs."""
     diagram_labels = DiagramLabels.nothing(places.size, places.shape[2])
-    known = decided(crossings, verdicts)
+    is_decided = decided(crossings, verdicts)
     tracks = AttractorMatcher(reach)
     for k in range(places.shape[2]):
-        here = [job for job in places[:, :, k].ravel().tolist() if known[job]]
+        here = [job for job in places[:, :, k].ravel().tolist() if is_decided[job]]
         seen = [judge.attractor(crossings, verdicts, job) for job in here]
         first = groups(seen, judge.tight)
         distinct = sorted(set(first))

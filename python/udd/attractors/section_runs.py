@@ -84,8 +84,10 @@ class SectionRunner:
         )
         runs = np.flatnonzero(~outside)
         if len(runs):
-            own, first = np.ascontiguousarray(values[runs]), np.ascontiguousarray(starts[runs])
-            batch = Batch(self.model, own, first, self.rtol, self.atol, self.threads, None, self.max_step)
+            run_values, first = np.ascontiguousarray(values[runs]), np.ascontiguousarray(starts[runs])
+            batch = Batch(
+                self.model, run_values, first, self.rtol, self.atol, self.threads, None, self.max_step
+            )
             surfaces = list(zip(self.section, self.direction, strict=True))
             got = _core.sections(batch, surfaces, skip, count, self.t_each * (skip + count))
             columns = got["t"].shape[1]  # fewer after Ctrl-C

@@ -74,8 +74,8 @@ def run_in_order(
     values = places.shape[2]
     try:
         if steps is not None:
-            for these, own in steps:
-                work(these, own)
+            for these, starts in steps:
+                work(these, starts)
                 tell(len(these))
                 if (crossings.outcome[these] == INTERRUPTED).any():
                     return True

@@ -142,18 +142,18 @@ class Section(Drawable):
         """
         if which not in range(len(self.section)):
             raise ModelError(f"there are {len(self.section)} surfaces, counted from 0, and none is {which!r}")
-        own = self.which == which
-        count = own.sum(axis=-1)
-        order = np.argsort(~own, axis=-1, kind="stable")[..., : int(count.max(initial=0))]
-        there = np.take_along_axis(own, order, axis=-1)
+        is_chosen = self.which == which
+        count = is_chosen.sum(axis=-1)
+        order = np.argsort(~is_chosen, axis=-1, kind="stable")[..., : int(count.max(initial=0))]
+        there = np.take_along_axis(is_chosen, order, axis=-1)
         t = np.where(there, np.take_along_axis(self.t, order, axis=-1), np.nan)
         state = np.take_along_axis(self.state, order[..., None], axis=-2)
         state = np.where(there[..., None], state, np.nan)
-        found = int(count) if count.ndim == 0 else count
+        crossing_count = int(count) if count.ndim == 0 else count
         index = np.where(there, 0, -1)
         names, directions = (self.section[which],), (self.direction[which],)
         rest = (self.residual, self.outcome, self.end, self.t_end, self.model)
-        return Section(t, state, index, names, directions, found, *rest)
+        return Section(t, state, index, names, directions, crossing_count, *rest)
 
     @checked_arguments
     def return_map(self, component: str) -> tuple[_Floats, _Floats]:
@@ -224,8 +224,8 @@ class Section(Drawable):
         model = self.model
         dims = [*axes(self.t.shape[:-1], "orbit"), "crossing"]
         attrs = {"model": repr(model), "section": "; ".join(self.section)}
-        found = of_states(model.state_names, model.state_units, self.state, dims, {}, **attrs)
-        return found.assign(t=(dims, self.t), which=(dims, self.which))
+        dataset = of_states(model.state_names, model.state_units, self.state, dims, {}, **attrs)
+        return dataset.assign(t=(dims, self.t), which=(dims, self.which))
 
     def _single(self, what: str) -> None:
         if len(self.section) > 1:

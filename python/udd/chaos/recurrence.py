@@ -71,9 +71,9 @@ def periods(points: Floats, tight: Tightness) -> NDArray[np.int32]:
         raise ValueError(f"{n} points are too few to tell a period")
     longest = n // 3
     back = points[:, n - 1 - longest : n - 1][:, ::-1]
-    near = np.abs(back - points[:, -1:]).max(axis=2) < _NEAR
+    is_near = np.abs(back - points[:, -1:]).max(axis=2) < _NEAR
     for p in range(1, longest + 1):
-        rows = np.flatnonzero((result <= 0) & near[:, p - 1])
+        rows = np.flatnonzero((result <= 0) & is_near[:, p - 1])
         if not len(rows):
             continue
         late, to_come = _changes(points[rows], p)

@@ -281,8 +281,8 @@ def lyapunov_spectrum(
     order = np.argsort(-values, kind="stable")
     values, errors = values[order], errors[order]
     # On an attractor that is a curve the exponent along it is zero, whatever the averages still say.
-    known = {"equilibrium": 0.0, "periodic orbit": 1.0, "escapes": np.nan}
-    dimension = known[verdict] if verdict in known else kaplan_yorke(values)
+    dimensions = {"equilibrium": 0.0, "periodic orbit": 1.0, "escapes": np.nan}
+    dimension = dimensions[verdict] if verdict in dimensions else kaplan_yorke(values)
     if verdict == "torus":
         dimension = kaplan_yorke(np.where(np.abs(values) < _STAYS / time_scale, 0.0, values))
     return Spectrum(

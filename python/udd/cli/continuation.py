@@ -91,8 +91,8 @@ def run(args: argparse.Namespace) -> CommandResult:
     }
     lines = [_text(branch) for branch in branches]
     if args.cascade is not None:
-        found, said = _cascade(args, branches)
-        data["cascade"] = found
+        result, said = _cascade(args, branches)
+        data["cascade"] = result
         lines.append(said)
     if args.crises:
         data["crises"], said = _crises(branches)
@@ -109,10 +109,10 @@ def _branches(args: argparse.Namespace, model: Model) -> list[Branch]:
     bounds = (args.first, args.last)
     starts: list[Equilibrium | PeriodicOrbit] = []
     if args.of == "equilibria":
-        found = equilibria(model)
-        if not found:
-            raise UddError(f"no equilibrium to follow was found by {found.search}; try another value of --at")
-        starts += found
+        rests = equilibria(model)
+        if not rests:
+            raise UddError(f"no equilibrium to follow was found by {rests.search}; try another value of --at")
+        starts += rests
     else:
         guess = None if args.state is None else numbers([args.state], "--state")
         try:
@@ -181,9 +181,9 @@ def _crises(branches: list[Branch]) -> tuple[list[dict[str, Any]], str]:
         raise UddError("there is no branch of cycles at which a crisis could be")
     with status_line() as tell:
         tell("looking for crises")
-        found = [crisis for branch in cycles for crisis in crises(branch)]
-    lines = [f"  {str(crisis)[1:-1]}" for crisis in found] or ["  none was found"]
-    return [crisis.as_dict() for crisis in found], "\n".join(["crises:", *lines])
+        all_crises = [crisis for branch in cycles for crisis in crises(branch)]
+    lines = [f"  {str(crisis)[1:-1]}" for crisis in all_crises] or ["  none was found"]
+    return [crisis.as_dict() for crisis in all_crises], "\n".join(["crises:", *lines])
 
 
 def _text(branch: Branch) -> str:

@@ -92,5 +92,5 @@ def _fail(message: str) -> int:
     return 1
 
 
-def _warn(message: Warning | str, *_details: Any, **_more: Any) -> None:
+def _warn(message: Warning | str, *_details: Any, **_options: Any) -> None:
     print(f"udd: warning: {' '.join(in_options(str(message)).split())}", file=sys.stderr)

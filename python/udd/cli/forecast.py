@@ -66,10 +66,10 @@ def run(args: argparse.Namespace) -> CommandResult:
     checked(args.out, _DATA)
     given = inputs_of(args)
     measurement, model = given.measured
-    known = measurement if args.start is None else measurement.rows(measurement.t <= args.start)
+    record = measurement if args.start is None else measurement.rows(measurement.t <= args.start)
     with status_line() as tell:
         tell("fitting")
-        fitted = fit(known, model, **options(args))
+        fitted = fit(record, model, **options(args))
         tell("running the ensemble")
         prediction = forecast(
             measurement,

@@ -222,8 +222,10 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     from udd.tracking import track
 
     radius = 0.08 if args.R is None else args.R
-    found = whole(args, lambda: track(args.file, disk_radius=radius, progress=shown_progress()))
-    return found.with_meta(**{key: value for key, value in constants.items() if value is not None}), args.file
+    tracked = whole(args, lambda: track(args.file, disk_radius=radius, progress=shown_progress()))
+    return tracked.with_meta(
+        **{key: value for key, value in constants.items() if value is not None}
+    ), args.file
 
 
 def _is_gyroscope(args: argparse.Namespace, limit: dict[str, float]) -> bool:
@@ -241,9 +243,9 @@ def _gyroscope(args: argparse.Namespace, limit: dict[str, float]) -> Measurement
     options = {"rate": args.sampling, "repeated": args.repeated, "part": args.part}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r".*: converted .*, as its columns say$")
-        found = read_gyroscope(args.file, args.gyroscope or None, **limit, **options)
-    print(f"udd: {args.file}: read Omega from {found.meta['gyroscope']}", file=sys.stderr)
-    return found
+        record = read_gyroscope(args.file, args.gyroscope or None, **limit, **options)
+    print(f"udd: {args.file}: read Omega from {record.meta['gyroscope']}", file=sys.stderr)
+    return record
 
 
 def add_partial(parser: argparse.ArgumentParser) -> None:

@@ -117,7 +117,7 @@ def runs_of(args: argparse.Namespace) -> dict[str, Any]:
     for name, least in (("points", 12), ("transient", 0)):
         check_count(name, getattr(args, name), least)
     names = {"section": "section", "direction": "direction", "points": "n", "transient": "transient"}
-    options = {own: getattr(args, name) for name, own in names.items()}
+    options = {option: getattr(args, name) for name, option in names.items()}
     extend = {} if args.extend is None else {"max_extension": args.extend}
     return {**options, **extend, "rtol": args.rtol, "atol": args.atol}
 

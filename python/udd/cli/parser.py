@@ -59,18 +59,20 @@ class Parser(argparse.ArgumentParser):
         """Refuse what is left over here, where the usage is the command's own."""
         given, rest = super().parse_known_args(args, namespace)
         if rest:
-            known = [option for action in self._actions for option in action.option_strings]
+            option_strings = [option for action in self._actions for option in action.option_strings]
             option = rest[0].partition("=")[0]
-            hint = meant(option, known) if option.startswith("-") else ""
+            hint = meant(option, option_strings) if option.startswith("-") else ""
             self.error(f"unrecognized arguments: {' '.join(rest)}{hint}")
         return given, rest
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is no choice, with the nearest one."""
         if action.choices is not None and value not in action.choices:
-            known = [str(choice) for choice in action.choices]
+            choices = [str(choice) for choice in action.choices]
             what = "no command" if isinstance(action, argparse._SubParsersAction) else "invalid choice"
-            message = f"{what}: {str(value)!r:.60}{meant(str(value), known)} (choose from {', '.join(known)})"
+            message = (
+                f"{what}: {str(value)!r:.60}{meant(str(value), choices)} (choose from {', '.join(choices)})"
+            )
             raise argparse.ArgumentError(action, message)
 
 
@@ -106,11 +108,11 @@ def make_parser() -> argparse.ArgumentParser:
         made = [name for name in commands.choices if name not in before]
         lines = [f"  {name:13} {commands.choices[name].summary}" for name in made]
         lists.append("\n".join([f"{group}:", *lines]))
-    more = (
+    notes = (
         "Begin with `udd demo`, or `udd example all`. Each command has a help with examples: udd fit --help"
     )
     commands.choices["completion"].set_defaults(whole_parser=parser)
-    parser.epilog = "\n\n".join([*lists, more])
+    parser.epilog = "\n\n".join([*lists, notes])
     return parser
 
 

@@ -126,8 +126,8 @@ def run(args: argparse.Namespace) -> CommandResult:
     return CommandResult(table if args.out is None else "", data, 130 if stopped else 0)
 
 
-def _mean_gap(found: Section) -> float:
-    return float((found.t[-1] - found.t[0]) / (found.found - 1)) if found.found > 1 else float("nan")
+def _mean_gap(section: Section) -> float:
+    return float((section.t[-1] - section.t[0]) / (section.found - 1)) if section.found > 1 else float("nan")
 
 
 def _lines(section: Section) -> list[str]:

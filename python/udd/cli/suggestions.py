@@ -14,5 +14,5 @@ def meant(word: str, choices: Iterable[str]) -> str:
     """
     every = list(choices)
     same = [choice for choice in every if choice.casefold() == word.casefold()]
-    near = same or difflib.get_close_matches(word, every, 1, 0.6)
-    return f"; did you mean {near[0]}?" if near else ""
+    matches = same or difflib.get_close_matches(word, every, 1, 0.6)
+    return f"; did you mean {matches[0]}?" if matches else ""

@@ -245,8 +245,8 @@ def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
     seconds = 20.0 if args.seconds is None else args.seconds
     made = record(args.film, camera=args.camera, seconds=seconds, progress=shown_progress())
     args.file = made.path
-    told = {"frames": len(made.t), "lost": made.lost, "gaps_s": made.gaps, "clock": made.clock}
-    return f"{made}\nwritten: {made.path}\n", {"recording": {**told, "film": made.path}}
+    summary = {"frames": len(made.t), "lost": made.lost, "gaps_s": made.gaps, "clock": made.clock}
+    return f"{made}\nwritten: {made.path}\n", {"recording": {**summary, "film": made.path}}
 
 
 _SAID = (
@@ -333,9 +333,9 @@ def _bob(said: str) -> Any:
     try:
         return [int(code) for code in said.split(",", 2)]
     except ValueError:
-        known = ", ".join(NAMED | PALE)
+        colours = ", ".join(NAMED | PALE)
         raise UddError(
-            f"--bob must be one of {known}, two of them (red,blue), or codes like 150,105,65, not {said}"
+            f"--bob must be one of {colours}, two of them (red,blue), or codes like 150,105,65, not {said}"
         ) from None
 
 

@@ -50,8 +50,8 @@ def clicked(args: argparse.Namespace, options: dict[str, Any]) -> tuple[dict[str
     said |= {name: value for name, value in given.items() if value is not None and name != "config"}
     if is_terminal():
         print("udd: looking for a calm frame; a window opens then", file=sys.stderr)
-    found = click(args.file, distance=args.distance, config=said)
-    write_config(args.click, found, comment=_HEAD.format(film=args.file.name))
+    answers = click(args.file, distance=args.distance, config=said)
+    write_config(args.click, answers, comment=_HEAD.format(film=args.file.name))
     args.config = args.click
     line = f"what was clicked is written: {args.click}"
-    return {**options, "config": args.click}, f"{line}\n", {"clicked": found, "config": args.click}
+    return {**options, "config": args.click}, f"{line}\n", {"clicked": answers, "config": args.click}

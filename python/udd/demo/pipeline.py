@@ -64,7 +64,7 @@ def demo(
         measurement = track(film, disk_radius=R, progress=progress).with_meta(W=W, origin=ORIGIN)
         measurement.to_csv(table)
         with status(progress) as tell:
-            found = discover(measurement, Disk(W, R=R), progress=tell)
+            discovery = discover(measurement, Disk(W, R=R), progress=tell)
             tell("writing the page")
-        found.report(page, film=film, command="udd demo" + (" --null" if null else ""))
-    return Demo(found, table, page)
+        discovery.report(page, film=film, command="udd demo" + (" --null" if null else ""))
+    return Demo(discovery, table, page)

@@ -84,9 +84,9 @@ def write(name: str, folder: str | os.PathLike[str] = ".") -> list[Path]:
     >>> [file.name for file in udd.examples.write("driven", tempfile.mkdtemp())]
     ['driven.csv', 'driven.json']
     """
-    known = (*NAMES, "all")
-    if name not in known:
-        raise _unknown(name, known)
+    names = (*NAMES, "all")
+    if name not in names:
+        raise _unknown(name, names)
     target = made_folder(folder)
     files = _SHIPPED if name == "all" else NAMES[name]
     made = [_copied(FOLDER / file, target / file) for file in files]
@@ -104,6 +104,6 @@ def _copied(source: Path, target: Path) -> Path:
 
 
 def _unknown(name: str, known: tuple[str, ...]) -> UddError:
-    near = difflib.get_close_matches(str(name), known, 1)
-    meant = f"; did you mean {near[0]}?" if near else ""
+    matches = difflib.get_close_matches(str(name), known, 1)
+    meant = f"; did you mean {matches[0]}?" if matches else ""
     return UddError(f"no example is called {name!r:.60}{meant} (there are {', '.join(known)})")

@@ -383,10 +383,11 @@ def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) ->
     """
     models = tuple(model.with_effects((*model.effects, *effects)) for model in fitted.models)
     known_count = len(fitted.model.parameters)
-    more = [value for effect in effects for value in effect.values]
+    effect_values = [value for effect in effects for value in effect.values]
     end = (start or fitted).point
     sets = tuple(
-        FilmParameters([*values[:known_count], *more], camera, clock) for values, camera, clock in end.sets
+        FilmParameters([*values[:known_count], *effect_values], camera, clock)
+        for values, camera, clock in end.sets
     )
     return replace(fitted.problem, models=models), Point(end.states, sets)
 

@@ -362,19 +362,19 @@ class Fit(Drawable):
     def __repr__(self) -> str:
         """Describe the fit in one line; :meth:`summary` says more."""
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in list(self.parameters.items())[:4])
-        more = ", ..." if len(self.parameters) > 4 else ""
+        ending = ", ..." if len(self.parameters) > 4 else ""
         written = [
             "Model" if isinstance(model, FormulaModel) else type(model).__name__ for model in self.models
         ]
         kinds = ", ".join(dict.fromkeys(written))
-        return f"<Fit of {kinds}: {self._state}; {numbers}{more}>"
+        return f"<Fit of {kinds}: {self._state}; {numbers}{ending}>"
 
     def _repr_html_(self) -> str:
         """Format :meth:`summary` for notebooks."""
         from html import escape
 
-        first, *more = self.doubts.sentences
-        items = "".join(f"<li>{escape(line)}</li>" for line in more)
+        first, *other_sentences = self.doubts.sentences
+        items = "".join(f"<li>{escape(line)}</li>" for line in other_sentences)
         table = escape("\n".join(self._table()))
         head = f"<p>{escape(self._state)}: <strong>{escape(first)}</strong></p>"
         return f"{head}<ul>{items}</ul><pre>{table}</pre>"

@@ -136,6 +136,6 @@ def _noised(measurement: Measurement, times: float, rng: np.random.Generator) ->
     """Add noise to a measurement's inputs, in variance `times` what they have."""
     signals = {}
     for name, signal in measurement.inputs.items():
-        more = np.sqrt(times) * noise_of(signal) * rng.normal(size=len(signal))
-        signals[name] = InputSignal(signal.t, signal.values + more, signal.hold)
+        added_noise = np.sqrt(times) * noise_of(signal) * rng.normal(size=len(signal))
+        signals[name] = InputSignal(signal.t, signal.values + added_noise, signal.hold)
     return replace(measurement, inputs=signals)

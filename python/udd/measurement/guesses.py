@@ -73,8 +73,8 @@ def _role(heading: Heading) -> str:
     if heading.unit in UNITS["rad/s"]:
         return "Omega"
     words = _words(heading)
-    for role, known in _WORDS.items():
-        if any(word in words for word in known):
+    for role, role_words in _WORDS.items():
+        if any(word in words for word in role_words):
             return role
     return _LETTERS.get((heading.plain or heading.name).casefold().strip(), "")
 

@@ -24,8 +24,10 @@ def gyroscope_columns(path: str | os.PathLike[str], *, limit: float = LARGEST) -
 
 def holds_rates_alone(path: str | os.PathLike[str], *, limit: float = LARGEST) -> bool:
     """Return True if a file has rates of turning, and no place or angle of a disk or a pendulum."""
-    found = headings_of(path, limit=limit)
-    return any(one.unit in UNITS["rad/s"] for one in found) and not {one.name for one in found} & _PLACES
+    headings = headings_of(path, limit=limit)
+    return (
+        any(one.unit in UNITS["rad/s"] for one in headings) and not {one.name for one in headings} & _PLACES
+    )
 
 
 def read_gyroscope(

@@ -181,9 +181,9 @@ class InputSignal(Drawable):
         piece = np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, len(self.t) - 2)
         since = at - self.t[piece]
         powers = since[..., None] ** np.arange(4)
-        held = (self.pieces[piece] * powers).sum(axis=-1)
+        values = (self.pieces[piece] * powers).sum(axis=-1)
         # A held sample lasts until the next one; the last one is met at the end.
-        return np.asarray(np.where(at >= self.t[-1], self.values[-1], held))
+        return np.asarray(np.where(at >= self.t[-1], self.values[-1], values))
 
     def __len__(self) -> int:
         return len(self.t)

@@ -225,10 +225,10 @@ def _drivers(inputs: str | Sequence[str] | Mapping[str, str] | None) -> dict[str
         return pairs(inputs, "inputs")
     if not isinstance(inputs, Iterable):
         raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
-    found = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
-    if not all(isinstance(part, str) for pair in found.items() for part in pair):
+    column_of = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
+    if not all(isinstance(part, str) for pair in column_of.items() for part in pair):
         raise MeasurementError(f"inputs must be names of columns, not {inputs!r}")
-    return found
+    return column_of
 
 
 def _load(path: Path, given: list[str] | None, limit: float) -> list[Table]:
@@ -258,9 +258,9 @@ def _measurement(
     names, bob = _names(record, states)
     columns = ("x", "y") if bob else names
     mapped = record.mapping is not None
-    known = ("t", *columns) if states is None and names in (DISK, PENDULUM) else ()
-    own = states is not None and not mapped
-    frames = record.frames(columns, Units(frozenset(known), mapped, own))
+    unit_columns = ("t", *columns) if states is None and names in (DISK, PENDULUM) else ()
+    keeps_units = states is not None and not mapped
+    frames = record.frames(columns, Units(frozenset(unit_columns), mapped, keeps_units))
     t = frames.times()
     extra: dict[str, Any] = {}
     if bob:

@@ -86,8 +86,8 @@ class Recorded:
 
     def missing(self, asked: str) -> MeasurementError:
         """Return the sentence about a column that is in no table."""
-        found = [raw for table in self.tables for raw in table.raw_headings]
-        listed = ", ".join(found[:40]) + (f" and {len(found) - 40} more" if len(found) > 40 else "")
+        headings = [raw for table in self.tables for raw in table.raw_headings]
+        listed = ", ".join(headings[:40]) + (f" and {len(headings) - 40} more" if len(headings) > 40 else "")
         return MeasurementError(f"no column {asked}: found {listed or 'nothing'}")
 
     def frames(self, names: Sequence[str], units: Units) -> Frames:

@@ -109,8 +109,8 @@ def smooth(
             raise MeasurementError(f"slip is for a disk with columns {DISK}, not {measurement.names}")
     check_length(measurement)
     if isinstance(angles, str) or not set(angles) <= set(measurement.names):
-        known = ", ".join(measurement.names)
-        raise MeasurementError(f"angles must be a list of columns, not {angles!r:.80}: there are {known}")
+        names = ", ".join(measurement.names)
+        raise MeasurementError(f"angles must be a list of columns, not {angles!r:.80}: there are {names}")
     measurement = unwrapped(measurement, angles)
     frame = float(np.median(np.diff(measurement.t)))
     stretches = _stretches(measurement, gap, frame)
@@ -153,11 +153,11 @@ def _stretches(m: Measurement, gap: float, frame: float) -> list[_Stretch]:
     # a gap that is just as long as was said is bridged, whatever the last bit of the times
     cuts = np.flatnonzero(np.diff(m.t[seen]) > gap * (1 + 1e-9)) + 1
     what, noise = np.where(m.seen[:, None], m.values, np.nan), m.covariance()
-    found = []
+    stretches = []
     for part in np.split(seen, cuts):
         rows = slice(int(part[0]), int(part[-1]) + 1)
-        found.append(_Stretch(rows, m.t[rows] / frame, what[rows], noise[rows]))
-    return found
+        stretches.append(_Stretch(rows, m.t[rows] / frame, what[rows], noise[rows]))
+    return stretches
 
 
 def _learn(stretches: list[_Stretch]) -> tuple[Array, Array]:

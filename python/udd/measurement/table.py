@@ -335,8 +335,8 @@ class Measurement(Drawable):
         bool
         """
         if name not in self.inputs:
-            known = ", ".join(self.inputs) or "no inputs"
-            raise MeasurementError(f"nothing that drives it is called {name!r:.80}; there are {known}")
+            input_names = ", ".join(self.inputs) or "no inputs"
+            raise MeasurementError(f"nothing that drives it is called {name!r:.80}; there are {input_names}")
         return np.array_equal(self.inputs[name].t, self.t)
 
     def __repr__(self) -> str:

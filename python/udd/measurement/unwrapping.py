@@ -58,10 +58,10 @@ def _jumps(angle: NDArray[np.float64]) -> bool:
 
 def _continuous(angle: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Unwrap an angle; rows that are not usable follow the last one before them that is."""
-    known = np.flatnonzero(np.isfinite(angle) & seen)
+    rows = np.flatnonzero(np.isfinite(angle) & seen)
     result = angle.copy()
-    result[known] = np.unwrap(angle[known])
+    result[rows] = np.unwrap(angle[rows])
     rest = np.flatnonzero(np.isfinite(angle) & ~seen)
-    before = known[np.maximum(np.searchsorted(known, rest) - 1, 0)]
+    before = rows[np.maximum(np.searchsorted(rows, rest) - 1, 0)]
     result[rest] -= _TURN * np.round((angle[rest] - result[before]) / _TURN)
     return result

@@ -178,8 +178,10 @@ class Model:
     @property
     def units(self) -> dict[str, str]:
         """The unit of every parameter, empty where dimensionless."""
-        own = {f"{e.name}.{p.name}": p.unit for e in self.effects if e.made for p in e.spec.parameters}
-        return dict(_core.model_parameters(self)) | own
+        effect_units = {
+            f"{e.name}.{p.name}": p.unit for e in self.effects if e.made for p in e.spec.parameters
+        }
+        return dict(_core.model_parameters(self)) | effect_units
 
     @property
     def _spec(
@@ -215,11 +217,11 @@ class Model:
         >>> udd.Disk(0.039).with_parameters({"W": 0.05}).W
         0.05
         """
-        known = self.parameters
+        parameters = self.parameters
         for name in values:
-            if name not in known:
+            if name not in parameters:
                 raise ModelError(
-                    f"{type(self).__name__} has no parameter {name!r}; it has {', '.join(known)}"
+                    f"{type(self).__name__} has no parameter {name!r}; it has {', '.join(parameters)}"
                 )
         return self._changed({n: values[n] for n in self._plain if n in values}, self._effects_with(values))
 
@@ -227,8 +229,8 @@ class Model:
         """Return the effects with other values of some parameters, by the model's names."""
         effects = []
         for effect in self.effects:
-            own = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
-            effects.append(effect.replace(**own) if own else effect)
+            changes = {p: values[key] for p in effect.parameters if (key := f"{effect.name}.{p}") in values}
+            effects.append(effect.replace(**changes) if changes else effect)
         return tuple(effects)
 
     def with_effects(self, effects: Iterable[Effect]) -> Self:

@@ -227,10 +227,15 @@ class FormulaModel(Model, written=True):
     @property
     def names_time(self) -> bool:
         """True if a formula of the rates contains the time `t` or a measured input."""
-        own = self._own
-        variables = [*own.states, *own.inputs]
-        parsed = (_core.formula_operations(text, variables, own.parameters) for text in own.equations)
-        return bool(own.inputs) or any(name == "t" for operations in parsed for name, _, _ in operations)
+        formula_text = self._own
+        variables = [*formula_text.states, *formula_text.inputs]
+        parsed = (
+            _core.formula_operations(text, variables, formula_text.parameters)
+            for text in formula_text.equations
+        )
+        return bool(formula_text.inputs) or any(
+            name == "t" for operations in parsed for name, _, _ in operations
+        )
 
     @property
     def kinematic(self) -> tuple[str, ...]:
@@ -391,10 +396,12 @@ class FormulaModel(Model, written=True):
         ModelError
             An unknown name or a value that is not finite.
         """
-        known = self.parameters
+        parameters = self.parameters
         for name in values:
-            if name not in known:
-                raise ModelError(f"the model has no parameter {name!r}; it has {', '.join(known) or 'none'}")
+            if name not in parameters:
+                raise ModelError(
+                    f"the model has no parameter {name!r}; it has {', '.join(parameters) or 'none'}"
+                )
         new = [(n, number(f"the parameter {n}", values.get(n, v))) for n, v in self.values]
         return self._with(values=tuple(new), effects=self._effects_with(values))
 
@@ -429,8 +436,8 @@ class FormulaModel(Model, written=True):
         checked = []
         for signals in records:
             if unknown := next((name for name in signals if name not in self.inputs), None):
-                known = ", ".join(self.inputs) or "none"
-                raise ModelError(f"the model has no input {unknown!r}; it has {known}")
+                input_names = ", ".join(self.inputs) or "none"
+                raise ModelError(f"the model has no input {unknown!r}; it has {input_names}")
             for name in self.inputs:
                 if not isinstance(signals.get(name), InputSignal):
                     raise ModelError(
@@ -540,8 +547,8 @@ class FormulaModel(Model, written=True):
                 _check_delay(effect, delayed, self.inputs, late)
                 late.append(delayed)
             if any(state not in self.state_names for state in self._entered(slot)):
-                known = ", ".join(f"{name}'" for name in self.state_names)
-                raise ModelError(f"{effect.name} adds to {slot}, but the model's rates are {known}")
+                rate_names = ", ".join(f"{name}'" for name in self.state_names)
+                raise ModelError(f"{effect.name} adds to {slot}, but the model's rates are {rate_names}")
             for name in effect.parameters:
                 if name in self.state_names:
                     raise ModelError(f"{effect.name} has a parameter {name!r}, which is the name of a state")
@@ -569,8 +576,8 @@ class FormulaModel(Model, written=True):
         new_values = {name: changes.pop(name) for name in list(changes) if name in self.parameters}
         for name in changes:
             if name not in arguments:
-                known = ", ".join((*arguments, *self.parameters))
-                raise ModelError(f"the model has no {name!r}; it has {known}")
+                argument_names = ", ".join((*arguments, *self.parameters))
+                raise ModelError(f"the model has no {name!r}; it has {argument_names}")
         new = FormulaModel(**(arguments | changes))
         if new.inputs == self.inputs:
             new = new._with(records=self.records, record=self.record)
@@ -582,8 +589,8 @@ class FormulaModel(Model, written=True):
         inputs = f", inputs={list(self.inputs)!r}" if self.inputs else ""
         delays = f", delays={dict(self.delays)!r}" if self.delays else ""
         observe = f", observe={dict(self.observe)!r}" if self.observe else ""
-        more = f"{angles}{mass}{inputs}{delays}{observe}"
-        text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{more})"
+        options = f"{angles}{mass}{inputs}{delays}{observe}"
+        text = f"Model({list(self.state_names)!r}, {self.equations!r}, {dict(self.values)!r}{options})"
         return f"{text}.with_effects({list(self.effects)!r})" if self.effects else text
 
 
@@ -600,8 +607,8 @@ FormulaModel.profile = ModelProfile(
 def _check_delay(effect: Effect, delayed: str, inputs: Sequence[str], late: Sequence[str]) -> None:
     """Return True if an effect can be the delay of an input."""
     if delayed not in inputs:
-        known = ", ".join(inputs) or "none"
-        raise ModelError(f"{effect.name} delays {delayed}, but the model's inputs are {known}")
+        input_names = ", ".join(inputs) or "none"
+        raise ModelError(f"{effect.name} delays {delayed}, but the model's inputs are {input_names}")
     if delayed in late:
         raise ModelError(f"the input {delayed} has a delay already: {effect.name} would be a second one")
     if effect.spec.core_formula is None or [effect.spec.core_formula[1]] != list(effect.amplitudes):
@@ -631,11 +638,11 @@ def _mass_matrix(model: FormulaModel, given: Sequence[Sequence[Expression]]) -> 
     if [len(row) for row in rows] != [len(speeds)] * len(speeds):
         raise ModelError(f"mass must be a table with a row and a column for each of {', '.join(speeds)}")
     mass = tuple(tuple(text_of("the mass matrix", one) for one in row) for row in rows)
-    held = model._with(mass=mass)
+    mass_model = model._with(mass=mass)
     # Numbers without a pattern, in which no formula is symmetric by accident.
     states = np.sin(np.arange(1.0, 3 * len(model.state_names) + 1)).reshape(3, -1)
     try:
-        at = held.mass_matrix(states)
+        at = mass_model.mass_matrix(states)
     except ModelError as error:
         raise ModelError(re.sub(r"the equation of \w+", "the mass matrix", str(error))) from None
     at = at[np.isfinite(at).all(axis=(1, 2))]
@@ -685,13 +692,15 @@ def _delays(
         raise ModelError(f"delays must be a table of inputs or sensors and parameters, not {delays!r}")
     for name, parameter in (delays or {}).items():
         if name not in inputs and name not in sensors:
-            more = f" and the sensors {', '.join(sensors)}" if sensors else ""
+            sensor_text = f" and the sensors {', '.join(sensors)}" if sensors else ""
             raise ModelError(
-                f"there is a delay of {name!r}, but the inputs are {', '.join(inputs) or 'none'}{more}"
+                f"there is a delay of {name!r}, but the inputs are {', '.join(inputs) or 'none'}{sensor_text}"
             )
         if parameter not in parameters:
-            known = ", ".join(parameters) or "none"
-            raise ModelError(f"the delay of {name} must be one of the parameters {known}, not {parameter!r}")
+            parameter_names = ", ".join(parameters) or "none"
+            raise ModelError(
+                f"the delay of {name} must be one of the parameters {parameter_names}, not {parameter!r}"
+            )
     return tuple((delays or {}).items())
 
 

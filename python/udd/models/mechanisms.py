@@ -80,10 +80,10 @@ def mechanism(
     except TypeError:
         raise ModelError("mass must be a table of formulas, and forces a list of them") from None
     if len(force) != n or [len(row) for row in rows] != [n] * n:
-        found = ", ".join(str(len(row)) for row in rows) or "none"
+        row_lengths = ", ".join(str(len(row)) for row in rows) or "none"
         raise ModelError(
             f"{n} coordinates need {n} forces and a mass matrix of {n} x {n}, "
-            f"not {len(force)} forces and rows of {found}"
+            f"not {len(force)} forces and rows of {row_lengths}"
         )
     whole = determinant(rows)
     accelerations = []
@@ -277,8 +277,8 @@ def pendulum_chain(
         forces.append(" + ".join(f"({part})" for part in parts))
     values = {
         f"{name}{i}": number(f"{name}{i}", v)
-        for name, own in columns.items()
-        for i, v in zip(links, own, strict=True)
+        for name, column in columns.items()
+        for i, v in zip(links, column, strict=True)
     }
     del values[f"l{n}"]
     return mechanism(

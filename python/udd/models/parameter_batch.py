@@ -65,7 +65,9 @@ def parameter_batch(
     try:
         shape = np.broadcast_shapes(states, *(value.shape for value in values.values()))
     except ValueError:
-        shapes = ", ".join(str(own) for own in (states, *(value.shape for value in values.values())))
+        shapes = ", ".join(
+            str(array_shape) for array_shape in (states, *(value.shape for value in values.values()))
+        )
         raise ModelError(f"state0 and parameters of the shapes {shapes} do not fit together") from None
     for name, value in values.items():
         for extreme in (value.min(), value.max()) if value.size else ():

@@ -17,8 +17,8 @@ def _compiled() -> dict[str, type[Model]]:
     kinds = _core.model_kinds()
     for kind in kinds:
         import_module(f"{__package__}.{kind}")
-    known = {cls.kind: cls for cls in CompiledModel.__subclasses__()}
-    return {kind: known[kind] for kind in kinds}
+    class_of = {cls.kind: cls for cls in CompiledModel.__subclasses__()}
+    return {kind: class_of[kind] for kind in kinds}
 
 
 #: Those that are compiled into the core.

@@ -85,8 +85,8 @@ def model_from_dict(data: object, *, fitted: bool = False) -> Model:
             raise ModelError(f"the model's effects must be a list, not {given['effects']!r}")
         given["effects"] = [effect_from_dict(effect) for effect in given["effects"]]
     cls = COMPILED[kind]
-    known = (*cls._plain, *cls._options)
-    arguments = table(f"a {kind}", given, known, needed=known[:1])
+    entry_names = (*cls._plain, *cls._options)
+    arguments = table(f"a {kind}", given, entry_names, needed=entry_names[:1])
     if not fitted:
         return cls(**arguments)
     plain = {name: value for name, value in arguments.items() if name in cls._plain}

@@ -97,10 +97,10 @@ def branches(
         raise UddError("equilibria have no period")
     ax = new_axes(ax)
     rows = [_curves(branch, name, view, section) for branch in shown]
-    for branch, own in zip(shown, rows, strict=True):
-        _draw(ax, branch, own)
-    for branch, own in zip(shown, rows, strict=True):
-        _mark(ax, branch, own)
+    for branch, branch_rows in zip(shown, rows, strict=True):
+        _draw(ax, branch, branch_rows)
+    for branch, branch_rows in zip(shown, rows, strict=True):
+        _mark(ax, branch, branch_rows)
     unit = model.units[parameter]
     ax.set_xlabel(f"{parameter} [{unit}]" if unit else parameter)
     if view == "period":

@@ -105,8 +105,8 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
     _checked(result)
     name = component
     if name is None:
-        own = result.section[0].removesuffix("'")
-        name = own if own in result.model.state_names else _components(result)[-1]
+        expression = result.section[0].removesuffix("'")
+        name = expression if expression in result.model.state_names else _components(result)[-1]
     x, following = result.return_map(name)
     said, factor = axis_of(result.model, name)
     x, following = factor * x.ravel(), factor * following.ravel()
@@ -148,8 +148,8 @@ def _components(result: Section) -> tuple[str, str]:
     names = sorted(result.model.state_names, key=lambda name: name in _TURNING)
     varied = []
     for name in names:
-        own = result.component(name)[np.isfinite(result.t)]
-        if np.ptp(own) > _SAME * np.abs(own).max(initial=0.0) and np.ptp(own) > _SAME:
+        values = result.component(name)[np.isfinite(result.t)]
+        if np.ptp(values) > _SAME * np.abs(values).max(initial=0.0) and np.ptp(values) > _SAME:
             varied.append(name)
     if len(varied) == 1 or (len(varied) == 2 and varied[1] in _TURNING):
         return "t", varied[0]

@@ -187,10 +187,17 @@ def spectrum(result: Any, ax: Axes | None = None) -> Axes:
 
 def _local(result: Covariant, ax: Axes) -> Axes:
     t = 0.5 * (result.t[:-1] + result.t[1:])
-    for k, own in enumerate(result.local_exponents.T):
+    for k, exponents in enumerate(result.local_exponents.T):
         shade = SHADES[k % len(SHADES)]
-        ax.plot(t, own, color=shade, linewidth=0.7, alpha=0.7, label=f"λ{k + 1}, mean {own.mean():.3g}")
-        ax.axhline(float(own.mean()), color=shade, linewidth=1.4)
+        ax.plot(
+            t,
+            exponents,
+            color=shade,
+            linewidth=0.7,
+            alpha=0.7,
+            label=f"λ{k + 1}, mean {exponents.mean():.3g}",
+        )
+        ax.axhline(float(exponents.mean()), color=shade, linewidth=1.4)
     ax.axhline(0, color=MEASURED, linewidth=0.8)
     ax.set_xlabel("time [unit of the model]")
     ax.set_ylabel("exponents of finite time [per unit of time]")

@@ -176,9 +176,9 @@ def coordinates(fit: Any) -> dict[str, Array]:
     result = {"t": fit.record.clock[:-1], **columns}
     if "beta" in columns:
         result["beta"] = np.mod(columns["beta"], 2 * np.pi)
-    for more in fit.model.profile.discovery.coordinates(fit.model):
-        values = more.of(result["t"], fit.states[:-1])
-        result[more.name] = np.mod(values, 2 * np.pi) if more.angle else values
+    for coordinate in fit.model.profile.discovery.coordinates(fit.model):
+        values = coordinate.of(result["t"], fit.states[:-1])
+        result[coordinate.name] = np.mod(values, 2 * np.pi) if coordinate.angle else values
     return result
 
 

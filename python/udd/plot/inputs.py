@@ -165,8 +165,8 @@ def motions(result: Any) -> list[Motion]:
         state = np.asarray(result.state, dtype=np.float64)
         model = getattr(result, "model", None)
         if isinstance(model, Model) and model.profile.written and state.ndim == 2:
-            own = dict(zip(model.state_names, state.T, strict=True))
-            return [Motion("simulated", np.asarray(result.t), own, model, None)]
+            state_columns = dict(zip(model.state_names, state.T, strict=True))
+            return [Motion("simulated", np.asarray(result.t), state_columns, model, None)]
         if state.ndim != 2 or state.shape[1] not in _BY_NUMBER:
             raise UddError(f"one trajectory can be drawn, state (time, 2 to 4), not {state.shape}")
         cls = _BY_NUMBER[state.shape[1]]

@@ -238,9 +238,9 @@ def whiteness(discovery: Discovery, surprises: Sequence[Innovations]) -> tuple[P
         "largest": Column("largest autocorrelation", number=True),
         "p": Column("Ljung–Box: probability for white noise", number=True),
     }
-    both = ", before and after" if discovery.effects else ""
+    remark = ", before and after" if discovery.effects else ""
     caption = (
-        f"Autocorrelation of the innovations{both}. The grey band holds 95 % of the values of white noise."
+        f"Autocorrelation of the innovations{remark}. The grey band holds 95 % of the values of white noise."
     )
     said = (
         "A right model predicts each frame from the earlier ones, up to white noise. The innovation is the "
@@ -317,9 +317,9 @@ def _round(discovery: Discovery, stage: int) -> tuple[Part, ...]:
         "estimate": Column("estimate"),
         "said": Column("remark"),
     }
-    told = [{**row, "equation": pretty(row["equation"])} for row in rows]
+    cells = [{**row, "equation": pretty(row["equation"])} for row in rows]
     best = replace(
-        table(f"{round_heading(stage)}: the best candidates", columns, told),
+        table(f"{round_heading(stage)}: the best candidates", columns, cells),
         summary="Table of the best candidates",
         open=stage == 0 and bool(discovery.effects),
         marked=frozenset(k for k, row in enumerate(rows) if row["said"] == "found"),

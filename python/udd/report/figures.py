@@ -131,11 +131,11 @@ def residuals(loose: Sequence[Fit]) -> Image:
     return png(figure, "The residual of one equation, frame by frame, along one coordinate")
 
 
-def curve(found: Curve) -> Image:
+def curve(located: Curve) -> Image:
     """Draw a curve that was located without a formula."""
     figure, ((ax,),) = blank(6.4, 3.4, top=0.45)
-    plot.curve(found, ax)
-    return svg(figure, f"{found.title}, with its band")
+    plot.curve(located, ax)
+    return svg(figure, f"{located.title}, with its band")
 
 
 def evidence(discovery: Discovery, stage: int) -> Image:

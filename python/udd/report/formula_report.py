@@ -55,11 +55,11 @@ _SHOWN = 8.0  # longest horizons of the held-out errors that the free runs are s
 def formula_head(discovery: Discovery) -> Head:
     """Build the head."""
     said = []
-    for found in discovery.effects:
+    for added in discovery.effects:
         values = Markup("")
-        if not wording.is_spline(found.effect):
-            values = Markup(" &ensp;with ") + wording.values_of(found, {})
-        said.append(Paragraph(Markup("{}").format(found.equation) + values, "formula"))
+        if not wording.is_spline(added.effect):
+            values = Markup(" &ensp;with ") + wording.values_of(added, {})
+        said.append(Paragraph(Markup("{}").format(added.equation) + values, "formula"))
     return head(discovery, "Effects that the model lacks", said, ", in units of the motion's spread")
 
 
@@ -91,8 +91,8 @@ def _errors(discovery: Discovery) -> Section:
         f"Median error over {len(discovery.error_before.samples)} starts, with 95 % intervals. Dotted: the "
         "noise floor, the error of a faultless model due to noise in the data and in the starting state."
     )
-    held = Paragraph(f"{held_back(discovery)} were not used for the fit.") if discovery.held_out else None
-    shown = parts(held, Figure(figures.errors(discovery), caption), errors_table(discovery))
+    note = Paragraph(f"{held_back(discovery)} were not used for the fit.") if discovery.held_out else None
+    shown = parts(note, Figure(figures.errors(discovery), caption), errors_table(discovery))
     return Section(errors_heading(discovery), shown)
 
 

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 def parameters(discovery: Discovery) -> list[dict[str, str]]:
     """List the model's free parameters: name, meaning, before, after, unit."""
-    hidden, own = _knots(discovery), discovery.fit.model.parameters
-    return _rows(discovery, lambda name: _base(name) in own and _base(name) not in hidden)
+    hidden, model_parameters = _knots(discovery), discovery.fit.model.parameters
+    return _rows(discovery, lambda name: _base(name) in model_parameters and _base(name) not in hidden)
 
 
 def camera(discovery: Discovery) -> list[dict[str, str]]:
     """List the fitted parameters of the camera: name, meaning, before, after, unit."""
-    own = discovery.fit.model.parameters
-    return _rows(discovery, lambda name: _base(name) not in own, share=("%", 100.0))
+    model_parameters = discovery.fit.model.parameters
+    return _rows(discovery, lambda name: _base(name) not in model_parameters, share=("%", 100.0))
 
 
 def _base(name: str) -> str:
@@ -124,8 +124,8 @@ def _meaning(name: str, discovery: Discovery) -> str:
     effect, dot, parameter = name.partition(".")
     if not dot:
         return meaning(name, discovery.measurement.kind) or name
-    found = next((f for f in discovery.effects if f.effect.name == effect), None)
-    return f"{found.title if found else effect}: {wording.pretty(parameter)}"
+    added = next((f for f in discovery.effects if f.effect.name == effect), None)
+    return f"{added.title if added else effect}: {wording.pretty(parameter)}"
 
 
 def measured(discovery: Discovery) -> Markup:

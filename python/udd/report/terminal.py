@@ -45,7 +45,9 @@ _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
 def as_text(report: Report) -> str:
     """Render a report as text, in characters that every terminal has; pictures are left out."""
-    return "\n".join([*_head(report.head), *(line for own in report.sections for line in _section(own))])
+    return "\n".join(
+        [*_head(report.head), *(line for section in report.sections for line in _section(section))]
+    )
 
 
 def _head(head: Head) -> Iterator[str]:

@@ -91,7 +91,11 @@ def verdict(discovery: Discovery) -> str:
 def _verdict(discovery: Discovery) -> str:
     said = "; and ".join(_counted(["; or ".join(_meanings(f, discovery)) for f in discovery.effects]))
     if discovery.verdict == "fits the first part, not confirmed":
-        titles = list(dict.fromkeys(near.title for near in discovery.rejected if near.why == "unconfirmed"))
+        titles = list(
+            dict.fromkeys(
+                candidate.title for candidate in discovery.rejected if candidate.why == "unconfirmed"
+            )
+        )
         said = " and ".join(titles)
         return (
             f"Not confirmed: {said} {'fit' if len(titles) > 1 else 'fits'} the first part of the record, but "

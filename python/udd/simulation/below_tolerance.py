@@ -82,8 +82,8 @@ def warn_of_some(
         if not np.isfinite(start).all():
             continue
         values = rows[job if len(rows) > 1 else 0].tolist()
-        own = model.with_parameters(dict(zip(model.parameters, values, strict=True)))
-        if warn_from(own, start, begin, float(each[job]), rtol, atol):
+        varied = model.with_parameters(dict(zip(model.parameters, values, strict=True)))
+        if warn_from(varied, start, begin, float(each[job]), rtol, atol):
             return
 
 

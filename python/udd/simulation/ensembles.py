@@ -82,8 +82,8 @@ class Ensemble(Drawable):
         """
         model, runs = self.model, axes(self.outcome.shape, "run")
         dims, coords, of_model = [*runs, "t"], {"t": self.t}, repr(model)
-        found = of_states(model.state_names, model.state_units, self.state, dims, coords, model=of_model)
-        return found.assign(outcome=(runs, np.asarray(self.outcome)))
+        dataset = of_states(model.state_names, model.state_units, self.state, dims, coords, model=of_model)
+        return dataset.assign(outcome=(runs, np.asarray(self.outcome)))
 
     def __repr__(self) -> str:
         return f"<Ensemble of {self.model!r}: runs {self.outcome.shape}, {len(self.t)} times>"

@@ -79,8 +79,12 @@ class Events:
 
     def of(self, kind: str) -> Events:
         """Return the events of one kind."""
-        chosen = np.array([own == kind for own in self.kind], dtype=bool)
-        return Events(tuple(own for own in self.kind if own == kind), self.t[chosen], self.state[chosen])
+        chosen = np.array([event_kind == kind for event_kind in self.kind], dtype=bool)
+        return Events(
+            tuple(event_kind for event_kind in self.kind if event_kind == kind),
+            self.t[chosen],
+            self.state[chosen],
+        )
 
 
 class Stats(NamedTuple):

@@ -80,8 +80,8 @@ def compute(part: Part, threads: int) -> Found:
             rows[:, parameters.index(name)] = values.ravel()
         else:
             states[:, model.state_names.index(name)] = values.ravel()
-    found = QUANTITIES[part.quantity].run(model, rows, states, part.options, threads)
-    return {name: values.reshape(*shape, *values.shape[1:]) for name, values in found.items()}
+    arrays = QUANTITIES[part.quantity].run(model, rows, states, part.options, threads)
+    return {name: values.reshape(*shape, *values.shape[1:]) for name, values in arrays.items()}
 
 
 def variables_of(spec: SweepSpec) -> tuple[Variable, ...]:

@@ -82,8 +82,8 @@ def spread(
         for future in flying:
             future.cancel()
     if lost:
-        more = f", as did {len(lost) - 1} more" if len(lost) > 1 else ""
-        raise ChunksLost(lost[0] + more)
+        addition = f", as did {len(lost) - 1} more" if len(lost) > 1 else ""
+        raise ChunksLost(lost[0] + addition)
 
 
 def _ticketed(_ticket: str, work: Callable[..., Any], *arguments: Any) -> Any:

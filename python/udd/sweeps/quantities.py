@@ -104,8 +104,8 @@ def _spectrum_variables(model: Model) -> tuple[Variable, ...]:
 
 
 def _lyapunov(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
-    found = _spectrum(model, rows, states, options, threads, all=False)
-    return {**found, **{name: found[name][:, 0] for name in ("value", "standard_error")}}
+    arrays = _spectrum(model, rows, states, options, threads, all=False)
+    return {**arrays, **{name: arrays[name][:, 0] for name in ("value", "standard_error")}}
 
 
 def _spectrum(
@@ -152,11 +152,11 @@ def _runs(model: Model, rows: Floats, states: Floats, options: Options, threads:
     ends = np.where(off[:, None], states, np.nan)
     outcome = np.full(len(states), EJECTED, dtype=np.int8)
     if not off.all():
-        found = _ended(model, rows[~off], states[~off], options, threads)
-        failed = found["outcome"] == FAILED
-        t_end[~off] = np.where(failed, np.nan, found["t_end"])
-        ends[~off] = np.where(failed[:, None], np.nan, found["end"])
-        outcome[~off] = found["outcome"]
+        arrays = _ended(model, rows[~off], states[~off], options, threads)
+        failed = arrays["outcome"] == FAILED
+        t_end[~off] = np.where(failed, np.nan, arrays["t_end"])
+        ends[~off] = np.where(failed[:, None], np.nan, arrays["end"])
+        outcome[~off] = arrays["outcome"]
     columns = {f"final_{name}": ends[:, k] for k, name in enumerate(model.state_names)}
     return {"t_end": t_end, **columns, "outcome": outcome}
 
@@ -190,8 +190,8 @@ def _ended_one_by_one(model: Model, rows: Floats, states: Floats, times: Floats,
 
 
 def _outcomes(model: Model, rows: Floats, states: Floats, options: Options, threads: int) -> Found:
-    found = _runs(model, rows, states, options, threads)
-    return {name: found[name] for name in ("t_end", "outcome")}
+    arrays = _runs(model, rows, states, options, threads)
+    return {name: arrays[name] for name in ("t_end", "outcome")}
 
 
 QUANTITIES: dict[str, Quantity] = {

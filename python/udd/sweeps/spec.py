@@ -239,17 +239,17 @@ class SweepSpec:
 def _axis(model: Model, name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return the checked values of an axis, as an immutable copy."""
     if name not in (*model.parameters, *model.state_names):
-        known = ", ".join((*model.parameters, *model.state_names))
-        raise ModelError(f"nothing of this model is called {name!r}; there are {known}")
+        names = ", ".join((*model.parameters, *model.state_names))
+        raise ModelError(f"nothing of this model is called {name!r}; there are {names}")
     axis = array(f"the values of {name}", values).copy()
     if axis.ndim != 1 or not len(axis):
         raise ModelError(f"the values of {name} must be a list of at least one number")
     if name in model.parameters:
-        effect, _, own = name.rpartition(".")
+        effect, _, parameter = name.rpartition(".")
         for value in (float(axis.min()), float(axis.max())):  # the ranges have no gaps
             if effect:
                 spec = next(e.spec for e in model.effects if e.name == effect)
-                next(p for p in spec.parameters if p.name == own).check(effect, value, strict=False)
+                next(p for p in spec.parameters if p.name == parameter).check(effect, value, strict=False)
             else:
                 model.replace(**{name: value})
     axis.flags.writeable = False

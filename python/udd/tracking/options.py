@@ -161,9 +161,13 @@ class TrackOptions:
 
     def _as_pendulum(self) -> None:
         """Return the options for a pendulum, whose bob is the only mark."""
-        more = [f.name for f in fields(self) if f.name in _OF_A_DISK and getattr(self, f.name) != f.default]
-        if more:
-            raise TrackError(f"{', '.join(more)}: not for a pendulum, which has a bob and a length alone")
+        disk_options = [
+            f.name for f in fields(self) if f.name in _OF_A_DISK and getattr(self, f.name) != f.default
+        ]
+        if disk_options:
+            raise TrackError(
+                f"{', '.join(disk_options)}: not for a pendulum, which has a bob and a length alone"
+            )
         self._set("layout", read_bob(self.bob))
 
     def _check(self) -> None:

@@ -52,9 +52,9 @@ def tables_of(
                 if (column := np.asarray(array[part]).squeeze()).ndim == 1 and column.dtype.kind in "biuf"
             }
         elif array.dtype.kind in "biuf" and array.size and array.squeeze().ndim <= 2:
-            found = _columns(name, array.squeeze())
-            columns |= found
-            stated |= dict.fromkeys(found, (units or {}).get(name, ""))
+            array_columns = _columns(name, array.squeeze())
+            columns |= array_columns
+            stated |= dict.fromkeys(array_columns, (units or {}).get(name, ""))
     if not columns:
         raise MeasurementError("the file holds no arrays of numbers")
     by_length: dict[int, dict[str, NDArray[Any]]] = {}

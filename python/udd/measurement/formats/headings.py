@@ -87,9 +87,9 @@ def headings(cells: Sequence[str]) -> list[Heading]:
         unit = next((one for one in stated if in_base_units(one)), stated[-1] if stated else "")
         # As an ending a unit belongs to what a disk and a pendulum are known by, unless that is there too.
         base, unit_after = _parted(plain)
-        known = _symbol(base)
-        if known in _ENDING and known not in taken and size(known, unit_after):
-            name, unit = known, unit_after
+        symbol = _symbol(base)
+        if symbol in _ENDING and symbol not in taken and size(symbol, unit_after):
+            name, unit = symbol, unit_after
         result.append(Heading(cell.strip(), name, unit, plain=plain))
     return result
 
@@ -142,6 +142,6 @@ def in_base_units(unit: str) -> tuple[float, str] | None:
 
 
 def _size(base: str, unit: str) -> float | None:
-    known = UNITS.get(base, {})
+    factors = UNITS.get(base, {})
     unit = unit.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
-    return known.get(unit, known.get(unit.lower()))
+    return factors.get(unit, factors.get(unit.lower()))

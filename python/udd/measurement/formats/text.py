@@ -181,11 +181,11 @@ def _with_last(
 ) -> Iterator[tuple[list[int], list[list[str]], bool]]:
     """Yield blocks that hold rows, and whether each is the last of them."""
     before: tuple[list[int], list[list[str]]] | None = None
-    for found, block in blocks:
+    for position, block in blocks:
         if block:
             if before is not None:
                 yield *before, False
-            before = found, block
+            before = position, block
     if before is not None:
         yield *before, True
 

@@ -126,8 +126,8 @@ def relaxation_needed(_lab: Lab) -> Figure:
         ("constraint", AFTER, "disk, constraint alone"),
         ("consistent", BEFORE, "disk, angular momentum too"),
     ):
-        found = [hopf(rotation_of_disk(float(b), momentum)) for b in relaxation]
-        drives = [np.nan if point is None else point.value for point in found]
+        hopf_drives = [hopf(rotation_of_disk(float(b), momentum)) for b in relaxation]
+        drives = [np.nan if point is None else point.value for point in hopf_drives]
         axes[0].plot(100 * np.array(drives), relaxation, color=colour, linewidth=1.8, label=words)
     damping = np.linspace(0.04, 0.5, 200)
     closed = np.array([device.hopf_drive(float(one)) for one in damping]) * device.L / device.TAU

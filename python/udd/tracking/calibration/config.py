@@ -47,8 +47,8 @@ def settings(config: Config, **given: Any) -> dict[str, Any]:
 def read_options(config: Config | TrackOptions | None, **given: Any) -> TrackOptions:
     """Read all options from a config and arguments; arguments (not None) take precedence."""
     if isinstance(config, TrackOptions):
-        more = {name: value for name, value in given.items() if value is not None}
-        return config.changed(more) if more else config
+        arguments = {name: value for name, value in given.items() if value is not None}
+        return config.changed(arguments) if arguments else config
     return TrackOptions(**settings({} if config is None else config, **given))
 
 

@@ -110,11 +110,11 @@ def _pull(
     ):
         if s is None or not used or s.weight is None or s.residual is None:
             continue
-        base, more, less = (
+        base, longer, less = (
             coverage(mark, complex(u, v), angle, motion(f * open_for), look.psf, s.box, local).ravel()
             for f in (1.0, 1 + SMALL, 1 - SMALL)
         )
-        slope = mark.level * s.gain * beyond_place((more - less)[None] / (2 * SMALL), base, s)[0]
+        slope = mark.level * s.gain * beyond_place((longer - less)[None] / (2 * SMALL), base, s)[0]
         pull += float((s.weight * slope) @ s.residual)
         information += float((s.weight * slope) @ slope)
     return pull, information

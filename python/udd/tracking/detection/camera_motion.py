@@ -271,8 +271,8 @@ class Background:
             yield 1 + 0j, 0j, y
         if self.failed < MOST_FAILED or self.failed % SELDOM == 0:
             for zoom in ZOOMS:
-                more = factor * zoom, shift + factor * self.middle * (1 - zoom)
-                yield *more, _seen_from(y, *more)
+                guess = factor * zoom, shift + factor * self.middle * (1 - zoom)
+                yield *guess, _seen_from(y, *guess)
 
     def _follow(self, y: Plane) -> tuple[NDArray[np.intp], NDArray[np.float32]] | None:
         """Points that go the same way from the first picture into this one, and where they are in it."""

@@ -288,10 +288,10 @@ class ClickSession:
 
     def _disk(self) -> tuple[complex, float, float | None]:
         """Return the disk's centre, its standard error, and the radius if the edge was clicked [pixels]."""
-        found = self.edge
-        if found is None:
+        edge = self.edge
+        if edge is None:
             return self.answers.rim[0], CENTRE * self.miss, None
-        return found.centre, found.centre_sigma, found.radius
+        return edge.centre, edge.centre_sigma, edge.radius
 
     @property
     def ends(self) -> tuple[int, int] | None:
@@ -302,12 +302,12 @@ class ClickSession:
 
     def _size(self) -> tuple[float, float] | None:
         """Pixels per metre and the standard error; None where nothing tells."""
-        ruler, known = self.answers.ruler, self.known.get("scale")
-        if known is not None:
-            return float(known), 0.0
+        ruler, scale = self.answers.ruler, self.known.get("scale")
+        if scale is not None:
+            return float(scale), 0.0
         if len(ruler) == 2 and self.distance is not None:
-            found = {m.centre: m.sigma for m in self.answers.marks}
-            error = math.hypot(*(found.get(z, self.miss) for z in ruler))
+            sigma_of = {m.centre: m.sigma for m in self.answers.marks}
+            error = math.hypot(*(sigma_of.get(z, self.miss) for z in ruler))
             return abs(ruler[1] - ruler[0]) / self.distance, error / self.distance
         rim = self.edge
         if rim is None:

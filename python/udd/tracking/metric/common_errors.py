@@ -82,10 +82,10 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
 def _excess(seen: Array, expected: Array) -> float:
     """Variance of u and of v with which the mean is what it is expected to be."""
 
-    def ratio(more: float) -> float:
-        each = seen / (expected + 2 * more)
+    def ratio(excess: float) -> float:
+        each = seen / (expected + 2 * excess)
         return float(np.minimum(each, OUTLIER * np.median(each)).mean()) / CUT
 
     if ratio(0.0) < 1 + SCATTER / np.sqrt(len(seen)):
         return 0.0
-    return float(brentq(lambda more: ratio(more) - 1, 0.0, float(seen.max()), rtol=1e-6))
+    return float(brentq(lambda surplus: ratio(surplus) - 1, 0.0, float(seen.max()), rtol=1e-6))

@@ -82,8 +82,8 @@ def _pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray
         turn = np.exp(-1j * angle[rows])
         swept = np.concatenate([[0], np.cumsum((turn[1:] + turn[:-1]) / 2 * np.diff(t[rows]))])
         even = np.column_stack([np.ones(WINDOW), swept])
-        both = np.column_stack([turn, centre[rows] * turn])
-        rests.append(both - even @ np.linalg.lstsq(even, both, rcond=None)[0])
+        motion = np.column_stack([turn, centre[rows] * turn])
+        rests.append(motion - even @ np.linalg.lstsq(even, motion, rcond=None)[0])
     turns, places = (np.array([rest[:, k] for rest in rests]) for k in (0, 1))
     pivot, keep = 0j, np.ones(len(rests), dtype=bool)
     for _ in range(4):

@@ -224,8 +224,8 @@ def _release(t: Array, values: Array, radius: float, drive: complex, unseen_afte
     bend = np.abs(-1j * GRAVITY + rate**2 * at[:-1] + 1j * rate * drive)
     first, then = np.abs(off[:-1]), np.abs(off[1:])
     alike = (off[:-1].conj() * off[1:]).real > ALIKE * first * then
-    most, more = ODD * usual, (bend * step**2)[:-1]
-    falls = (first > most) & (then > most) & alike & (np.abs(then - first - more) < 0.5 * more + most)
+    most, later = ODD * usual, (bend * step**2)[:-1]
+    falls = (first > most) & (then > most) & alike & (np.abs(then - first - later) < 0.5 * later + most)
     falls = np.append(falls & close[1:], unseen_after and abs(off[-1]) > most)
     falls &= close & (np.abs(at[:-1]) > NEAR_EDGE * radius)
     if not falls.any():

@@ -93,8 +93,8 @@ def correct_wobble(
         by, rest = f.response(f.across(across))
         left = f.left - explained
         precise = f.square(rest, rest) / noise + 1 / prior
-        more = (f.square(rest, left) / noise + (usual - short[k]) / prior) / precise
-        return change + more * by, left - more * rest, more, precise
+        next_short = (f.square(rest, left) / noise + (usual - short[k]) / prior) / precise
+        return change + next_short * by, left - next_short * rest, next_short, precise
 
     places = (1 + larger) * look.places
     for _ in range(ROUNDS):
@@ -157,6 +157,6 @@ class _Frame:
     def stretch(self, across: complex) -> tuple[float, float]:
         """Stretch along the axis, and what is left for each spare coordinate in units of its noise."""
         rests = np.stack([self.response(self.across(d))[1] for d in (across, 1j * across)], axis=1)
-        found = np.linalg.solve(rests.T @ self.weight @ rests, rests.T @ self.weight @ self.left)
-        left = self.left - rests @ found
-        return float(found[1]), self.square(left, left) / (len(left) - 5)
+        solution = np.linalg.solve(rests.T @ self.weight @ rests, rests.T @ self.weight @ self.left)
+        left = self.left - rests @ solution
+        return float(solution[1]), self.square(left, left) / (len(left) - 5)
