@@ -288,7 +288,7 @@ def test_sections_and_ensembles_are_those_of_the_built_in_model() -> None:
     np.testing.assert_array_equal(*runs)
     maxima = udd.poincare(lorenz(), n=5, state0=[1.0, 1.0, 1.0])
     assert maxima.section == ("x'",)
-    with pytest.raises(ModelError, match="where orbits of a model of your own start"):
+    with pytest.raises(ModelError, match="a model of your own has no usual initial state"):
         udd.lyapunov(lorenz())
 
 

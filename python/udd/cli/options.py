@@ -122,7 +122,7 @@ _LONG = 10.0  # m: length of a pendulum
 
 def _doubt(name: str, value: float, most: float, unit: str, usual: str) -> None:
     """Warn of a number that seems to be in centimetres."""
-    if value > most:
+    if most < value < float("inf"):
         centimetres = unit.replace("m", "cm")
         text = f"{name} is {value:g} {unit}; expected {usual}. Is it in {centimetres}?"
         warnings.warn(text, UserWarning, stacklevel=3)
