@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -274,73 +275,79 @@ class _Way:
     most: int
 
     def follow(self, start: SurfacePoint, sense: float) -> LocusTrace:
-        """Points from the start on; `sense` is that of the second parameter at first."""
-        surface, name = self.surface, FUNCTIONS[self.kind]
-        here, step, along = start, self.step, np.zeros_like(start.v)
-        along[-1] = sense
+        """Return points from the start on; `sense` is that of the second parameter at first."""
+        surface, here, step, first = self.surface, start, self.step, None
+        along = np.append(np.zeros(len(start.v) - 1), sense)
         trace = LocusTrace([_place(surface, self.kind, start)])
-        first = np.zeros_like(start.v)
-        watched: dict[str, float] | None = None
-        while len(trace.places) <= self.most:
+        before: dict[str, float] | None = None
+        while not trace.end:
+            if len(trace.places) > self.most:
+                trace.end = "as many points as were wanted"
+                break
             try:
                 surface, here = surface.anchored(here)
-                slope = surface.slope(here, name)
-                before = watched_functions(self.kind, surface, here, slope) if watched is None else watched
+                slope = surface.slope(here, FUNCTIONS[self.kind])
+                before = watched_functions(self.kind, surface, here, slope) if before is None else before
+                segment, ahead, after, step = self._step(surface, here, slope, along, step)
             except (CorrectorFailed, IntegrationError) as error:
                 trace.end = f"lost: {error}"
-                return trace
-            normal = slope / np.linalg.norm(slope)
-            ahead = here.ahead(np.array([-normal[1], normal[0]]))
-            ahead = ahead * (np.sign(ahead @ along) or 1.0)
-            first = first if first.any() else ahead
-            there, reason = None, "the curve turns too sharply"
-            while there is None and step >= _SHORTEST:
-                try:
-                    there = surface.zero(here, here.v + step * ahead, normal, name, step)
-                    gone = there.v - here.v
-                    slope = surface.slope(there, name)
-                    after = watched_functions(self.kind, surface, there, slope)
-                    if not gone @ ahead > _TURN * np.linalg.norm(gone):
-                        there = None
-                except (CorrectorFailed, IntegrationError) as error:
-                    there, reason = None, str(error)
-                step = step if there is not None else 0.5 * step
-            if there is None:
-                trace.end = f"lost: {reason}"
-                return trace
-            if vanishing_part(here.curve, here.v[:-1], there.v[:-1]) is not None:
-                # Folds of cycles are born at a Bautin point, where the cycles have no size.
-                points = _bautin_near(here, surface, self.box) if self.kind == "fold" else []
-                trace.points += points
-                trace.end = "a Bautin point" if points else "lost: the cycles shrink to an equilibrium"
-                return trace
-            segment = Segment(surface, name, here, normal, there)
-            outside = self._outside(there)
-            last = self._at_bounds(segment, outside)
-            for part, point in points_between(self.kind, segment, before, after):
-                if outside and (last is None or part > last[0]):
-                    continue
-                trace.points.append(point)
-                if point.kind in ENDS.get(self.kind, ()):
-                    trace.places.append(LocusPlace(point.values, point.solution, 0.0))
-                    trace.end = f"a {point.kind} point"
-                    return trace
-            if outside:
-                trace.end = f"the bound {outside[0][1] if last is None else last[1]:.6g}"
-                if last is not None:
-                    trace.places.append(_place(surface, self.kind, last[2]))
-                return trace
-            passed = (here.v - start.v) @ first < 0.0 <= (there.v - start.v) @ first
-            near = np.linalg.norm(there.v - start.v) < 1.5 * np.linalg.norm(there.v - here.v)
-            if len(trace.places) > _LOOP and passed and near:
+                break
+            first, there = ahead if first is None else first, segment.end
+            self._note(trace, segment, before, after)
+            if not trace.end:
+                passed = (here.v - start.v) @ first < 0.0 <= (there.v - start.v) @ first
+                near = np.linalg.norm(there.v - start.v) < 1.5 * segment.length
+                trace.end = CLOSED if len(trace.places) > _LOOP and passed and near else ""
                 trace.places.append(_place(surface, self.kind, there))
-                trace.end = CLOSED
-                return trace
-            here, along, watched = there, there.v - here.v, after
-            trace.places.append(_place(surface, self.kind, here))
+            here, along, before = there, there.v - here.v, after
             step = min(self.longest, 1.4 * step)
-        trace.end = "as many points as were wanted"
         return trace
+
+    def _step(
+        self, surface: SolutionSurface, here: SurfacePoint, slope: Floats, along: Floats, step: float
+    ) -> tuple[Segment, Floats, dict[str, float], float]:
+        """Return the next segment, the direction there, the functions at its end, and the step's length."""
+        name, reason = FUNCTIONS[self.kind], "the curve turns too sharply"
+        normal = slope / np.linalg.norm(slope)
+        ahead = here.ahead(np.array([-normal[1], normal[0]]))
+        ahead = ahead * (np.sign(ahead @ along) or 1.0)
+        while step >= _SHORTEST:
+            try:
+                there = surface.zero(here, here.v + step * ahead, normal, name, step)
+                after = watched_functions(self.kind, surface, there, surface.slope(there, name))
+                segment = Segment(surface, name, here, normal, there)
+                if (there.v - here.v) @ ahead > _TURN * segment.length:
+                    return segment, ahead, after, step
+            except (CorrectorFailed, IntegrationError) as error:
+                reason = str(error)
+            step *= 0.5
+        raise CorrectorFailed(reason)
+
+    def _note(
+        self, trace: LocusTrace, segment: Segment, before: dict[str, float], after: dict[str, float]
+    ) -> None:
+        """Note the special points of a segment, and the end of the curve if it ends there."""
+        surface, here, there = segment.surface, segment.begin, segment.end
+        if vanishing_part(here.curve, here.v[:-1], there.v[:-1]) is not None:
+            # Folds of cycles are born at a Bautin point, where the cycles have no size.
+            points = _bautin_near(here, surface, self.box) if self.kind == "fold" else []
+            trace.points += points
+            trace.end = "a Bautin point" if points else "lost: the cycles shrink to an equilibrium"
+            return
+        outside = self._outside(there)
+        last = self._at_bounds(segment, outside)
+        for part, point in points_between(self.kind, segment, before, after):
+            if outside and (last is None or part > last[0]):
+                continue
+            trace.points.append(point)
+            if point.kind in ENDS.get(self.kind, ()):
+                trace.places.append(LocusPlace(point.values, point.solution, 0.0))
+                trace.end = f"a {point.kind} point"
+                return
+        if outside:
+            trace.end = f"the bound {outside[0][1] if last is None else last[1]:.6g}"
+            if last is not None:
+                trace.places.append(_place(surface, self.kind, last[2]))
 
     def _outside(self, point: SurfacePoint) -> list[tuple[int, float]]:
         """The parameters that have left their bounds, and which bounds."""
@@ -354,20 +361,16 @@ class _Way:
     def _at_bounds(
         self, segment: Segment, outside: list[tuple[int, float]]
     ) -> tuple[float, float, SurfacePoint] | None:
-        """The part of a step after which the curve first meets a bound, the bound and the point there."""
-        met = [(self._at_bound(segment, k, bound), bound) for k, bound in outside]
-        places = [(one[0], bound, one[1]) for one, bound in met if one is not None]
-        return min(places, key=lambda place: place[0], default=None)
+        """Return the part of a step after which the curve first meets a bound, the bound, and the point."""
+        met = []
+        for k, bound in outside:
 
-    def _at_bound(self, segment: Segment, k: int, bound: float) -> tuple[float, SurfacePoint] | None:
-        """The part of a step after which the curve meets a bound of parameter `k`, and the point there."""
+            def beyond(point: SurfacePoint, k: int = k, bound: float = bound) -> float:
+                return float(self.surface.values(point)[k] - bound)
 
-        def beyond(point: SurfacePoint) -> float:
-            return float(self.surface.values(point)[k] - bound)
-
-        if abs(beyond(segment.begin)) <= 1e-12 * (abs(bound) or 1.0):
-            return None  # it begins on the bound
-        try:
-            return segment.zero(beyond)
-        except (CorrectorFailed, IntegrationError, ValueError, RuntimeError):
-            return None
+            # A segment that begins on the bound does not meet it.
+            if abs(beyond(segment.begin)) > 1e-12 * (abs(bound) or 1.0):
+                with suppress(CorrectorFailed, IntegrationError, ValueError, RuntimeError):
+                    part, point = segment.zero(beyond)
+                    met.append((part, bound, point))
+        return min(met, key=lambda place: place[0], default=None)
