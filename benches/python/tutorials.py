@@ -1,4 +1,4 @@
-"""The fifteen cases of continuation tutorials: right or wrong, seconds and statements.
+"""The fifteen cases of continuation tutorials: right or wrong, seconds of one core, and statements.
 
     python benches/python/tutorials.py
 
@@ -162,7 +162,7 @@ def main() -> None:
     """Print the table."""
     udd.equilibria(udd.DLE(1.0))  # what is imported at the first call is no part of a case
     for number, case in enumerate(CASES, 1):
-        begin = time.perf_counter()
+        begin = time.process_time()
         try:
             found, right = case()
             good = len(found) == len(right) and np.allclose(
@@ -170,7 +170,7 @@ def main() -> None:
             )  # published digits
         except (udd.UddError, IndexError, StopIteration) as error:
             good, found = False, [str(error)]  # type: ignore[list-item]
-        seconds = time.perf_counter() - begin
+        seconds = time.process_time() - begin
         word = "right" if good else f"wrong: {found}"
         name = f"{number:2d} {case.__name__:24s}"
         print(f"{name} {seconds:6.1f} s {statements(case):2d} statements  {word}", flush=True)
