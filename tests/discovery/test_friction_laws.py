@@ -79,6 +79,23 @@ def test_laws_with_a_scanned_number_compete_with_plain_ones():
     assert {"quadratic_drag", "power_drag", "warming_friction"} <= tried
 
 
+def test_curves_far_below_the_best_term_are_not_located(monkeypatch):
+    """Friction over the speed is: powers, thresholds and drags are its rivals."""
+    plain = udd.Pendulum(0.5, k0=0.01)
+    result = scored(seen(plain.with_effects([E.quadratic_drag(c=0.008)]), duration=20.0), plain)
+    names = {name for slot, name in located(result)}
+    assert {"|Omega|", "theta", "t"} <= names
+    best = max(curve.evidence for curve in result.curves)
+    monkeypatch.setattr(ScoreRound, "strongest", lambda _scores: best + 31.0)
+    assert located(result) == {("friction", "|Omega|")}
+
+
+def located(result: ScoreRound) -> set[tuple[str, str]]:
+    """Slots and coordinates of the curves that a round fits in full."""
+    curves = Proposals(result.fit, result, Clock(None, lambda _text: None))._near_curves()
+    return {curve.name for curve in curves}
+
+
 def test_scanned_values_score_as_their_full_derivatives_do():
     result = scores(E.local_brake(a=0.005, c=0.15, s=0.08))
     strongest, number = strongest_shapes(result.fit)

@@ -33,7 +33,7 @@ _ALIKE = 6  # further candidates that act almost like the best
 _TOGETHER = 6  # pairs of effects that may pass only together
 _COORDINATES = 4  # coordinates over which curves are located
 _HOPELESS = 2.0  # ratio to the best fit's chi2 above which a fit that does not converge is abandoned
-_FAR = 30.0  # nats by which the best curve may score below the best term of the library
+_FAR = 30.0  # nats by which a curve may score below the best term of the library
 _PAIRED = 4  # best-scored effects of which all pairs are fitted in full
 
 
@@ -93,7 +93,7 @@ class Proposals:
         if not single:
             return []
         # If a library term scores far higher than every curve, no curve is its rival.
-        least = max(single[0].evidence, self.scores.strongest() - _FAR) - EVIDENCE_MARGIN
+        least = max(single[0].evidence - EVIDENCE_MARGIN, self.scores.strongest() - _FAR)
         likely = [c for c in single if c.evidence > least]
         likely += [c for c in single if c.name == ("friction", "|Omega|") and c not in likely]
         kinds = list(dict.fromkeys(c.key_without_momentum for c in likely))[:_COORDINATES]
