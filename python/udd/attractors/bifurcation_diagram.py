@@ -199,13 +199,13 @@ def bifurcation(
 
     def work(these: NDArray[np.intp], states: Floats) -> None:
         if attractors:
-            one, job_verdicts = follow(
+            points, job_verdicts = follow(
                 runner, judge, rows[these], of_job[these], states, transient, n, longest
             )
             verdicts.put(these, job_verdicts)
         else:
-            one = runner(rows[these], states, transient, n)
-        put(crossings, these, one)
+            points = runner(rows[these], states, transient, n)
+        put(crossings, these, points)
 
     with progress_bar(places.size, "run", chosen["progress"], title="bifurcation") as bar:
         added = perturbation(judge.coordinates.size, nudge)

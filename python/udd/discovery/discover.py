@@ -184,12 +184,12 @@ def discover(
     background_import.importing("scipy.stats", "pyoperon.sklearn")
     part, whole, constrained = _known_model(data, options)
     tests = Acceptance(data.record, ~data.train, clock, motion_time_scale(part), part.problem.free)
-    known = SearchState(part, whole, tests.errors(part))
+    known_fits = SearchState(part, whole, tests.errors(part))
     search = Search(tests, given)
-    begin = _begin(search, known)
-    end = search.run(begin, known)
+    begin = _begin(search, known_fits)
+    end = search.run(begin, known_fits)
     clock.finish("fitting the model as found")
-    return _answer(data, known, begin, search, end, constrained)
+    return _answer(data, known_fits, begin, search, end, constrained)
 
 
 @dataclass(frozen=True)
@@ -274,17 +274,17 @@ def _known_model(data: _Data, options: dict[str, Any]) -> tuple[Fit, Fit, dict[s
 
 def _answer(
     data: _Data,
-    known: SearchState,
+    known_fits: SearchState,
     begin: SearchState,
     search: Search,
     end: Outcome,
     constrained: Mapping[str, tuple[float, float]],
 ) -> Discovery:
     """Describe the end of a search, with its verdict."""
-    baseline, before = known.whole, known.errors
+    baseline, before = known_fits.whole, known_fits.errors
     final = refit(end.whole)
     reported = eased(final) if final.scatter > UNEXPLAINED else final
-    reported = replace(reported, unit_doubt=known.part.unit_doubt).without_cache().with_diagnostics()
+    reported = replace(reported, unit_doubt=known_fits.part.unit_doubt).without_cache().with_diagnostics()
     added = [
         replace(f, by_record=by_record(baseline, end.whole, f.effect, data.order)[0])
         for step in end.accepted
