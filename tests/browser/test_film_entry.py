@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+
+import pytest
 
 import udd
 from browser_for_tests import Opened, until
 
+axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 SAMPLE = Path(udd.__file__).parent / "demo" / "sample.mp4"
 
 
@@ -79,6 +83,14 @@ def test_a_driven_pendulum_goes_from_its_table_to_the_verdict(opened: Opened) ->
     page.wait_for_selector("#found:not([hidden])", timeout=300_000)
     assert page.locator("#verdict").text_content() == "effect identified"
     assert "|Ω|" in page.locator("#added").text_content() or "abs(Ω)" in page.locator("#added").text_content()
+    rows = page.eval_on_selector_all(
+        "#constants tr", "all => all.map(r => r.cells[0].textContent + r.cells[2].textContent)"
+    )
+    assert any(re.fullmatch(r"gain[34]\.\d+\(\d+\)", row) for row in rows)
+    assert any(re.fullmatch(r"length0\.\d+\(\d+\) m", row) for row in rows)
+    assert page.locator("#figures small").first.text_content().endswith("of the motion's spread")
+    assert page.locator("#movie .panels").count() == 0  # the picture has a legend
+    assert axe.Axe().run(page).violations_count == 0
     # A disk's input is the drive itself: its unit is asked for, and W is not.
     page.click("#another")
     disk = "a;b;c;d;e\n" + "".join(f"{k / 50:.2f};{k % 7};{k % 5};{k};{30 + k % 3}\n" for k in range(60))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import hashlib
 import re
 from dataclasses import replace
@@ -367,6 +368,19 @@ def test_errors_of_the_known_model_contain_what_it_lacks() -> None:
     unit = {"m/s": 1.0, "cm/s": 1e2, "mm/s": 1e3}[str(row["unit"])]
     assert error == pytest.approx(unit * alone.errors["W"], rel=0.2)
     assert alone.errors["W"] > 20 * found.baseline.errors["W"]
+
+
+def test_an_error_below_the_noise_is_called_no_more_than_noise() -> None:
+    found = discovered.disk()
+    numbers = words.headline(found)
+    h = found.horizon
+    value, floor = found.error_after.at(h)[0], found.error_after.at(h)[3]
+    assert numbers.before_note == ""
+    assert numbers.after_note == ("no more than noise" if value <= floor else "")
+    for error, note in ((1.0, "no more than noise"), (1.01, "")):
+        median = np.full_like(found.error_after.median, error * floor)
+        scaled = dataclasses.replace(found, error_after=dataclasses.replace(found.error_after, median=median))
+        assert words.headline(scaled).after_note == note
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,19 @@ from udd.models.formula_model import FormulaModel
 #: The input's name in a disk's record, and in that of a pendulum.
 DRIVE, TORQUE = "W", "u"
 
+#: Meaning and unit of the constants of models with a gyroscope or an input.
+CONSTANTS = {
+    "length": ("length of the pendulum", "m"),
+    "k0": ("viscous friction", "m²/s"),
+    "k1": ("friction coefficient at rest", "m²/s"),
+    "k2": ("how fast friction falls with the speed of rotation", "m²"),
+    "R": ("radius of the disk", "m"),
+    "g": ("gravity", "m/s²"),
+    "bias": ("zero of the gyroscope", "rad/s"),
+    "theta0": ("zero of the angle", "rad"),
+    "gain": ("angular acceleration per unit of the input", ""),
+}
+
 
 def driven_model(measurement: Measurement, length: float | None, R: float) -> Model:
     """Return the model of a record with an input.

@@ -11,6 +11,7 @@ from udd.models.serialization import model_to_dict
 from udd.report import tables, wording
 from udd.report.document import text_of
 
+from .driven_models import CONSTANTS
 from .spec import model_of
 
 
@@ -30,6 +31,9 @@ def of(discovery: Any) -> dict[str, Any]:
             for e in discovery.effects
         ],
         "limits": [text_of(text) for text in wording.short_limits(discovery)],
+        "constants": _constants(discovery),
+        "of_spread": discovery.error_before.unit == "spread",
+        "no_more_than_noise": [bool(numbers.before_note), bool(numbers.after_note)],
         "before": numbers.before,
         "after": numbers.after if discovery.effects else None,
         "floor": numbers.floor,
@@ -43,6 +47,17 @@ def of(discovery: Any) -> dict[str, Any]:
         ],
         "explore": _explore(discovery),
     }
+
+
+def _constants(discovery: Any) -> list[dict[str, str]]:
+    """Return the fitted constants of the model: name, meaning, value with its standard error, unit."""
+    rows = []
+    for row in tables.parameters(discovery):
+        name, meaning, value, unit = (text_of(row[key]) for key in ("name", "meaning", "after", "unit"))
+        if meaning == name:  # of a model that the page wrote itself
+            meaning, unit = CONSTANTS.get(name, (meaning, unit))
+        rows.append({"name": name, "meaning": meaning, "value": value, "unit": unit})
+    return rows
 
 
 def _values(effect: Any) -> list[str]:

@@ -48,13 +48,14 @@ def head(discovery: Discovery, kicker: str, said: Iterable[Paragraph], unit: str
         Number(
             f"error of the known model {numbers.span}, on data it had not seen{unit}",
             numbers.before,
+            numbers.before_note,
             style="before",
         )
     ]
     if discovery.effects:
         interval = f"95 % interval {numbers.interval}"
         shown += [
-            Number("with the added effect", numbers.after, style="after"),
+            Number("with the added effect", numbers.after, numbers.after_note, style="after"),
             Number("error after over before", numbers.ratio, interval),
         ]
     floor = f"noise floor after {numbers.floor_at}: the error of a faultless model"

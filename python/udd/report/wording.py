@@ -53,6 +53,8 @@ class Headline:
     floor_at: str
     ratio: str
     interval: str
+    before_note: str
+    after_note: str
 
 
 def pretty(text: str) -> Markup:
@@ -214,16 +216,20 @@ def headline(discovery: Discovery) -> Headline:
         span, values = "over all of it (r.m.s.)", (before.whole, after.whole)
         h = before.horizons[-1]
     else:
-        span, values = f"after {h:.4g}\u00a0s", (before.at(h)[0], after.at(h)[0])
+        span, values = f"after {h:.3g}\u00a0s", (before.at(h)[0], after.at(h)[0])
     value, low, high = discovery.ratio
+    floor = after.at(h)[3]
+    notes = ["no more than noise" if error <= floor else "" for error in values]
     return Headline(
         span=span,
         before=length(values[0], unit),
         after=length(values[1], unit),
-        floor=length(after.at(h)[3], unit),
-        floor_at=f"{h:.4g}\u00a0s",
+        floor=length(floor, unit),
+        floor_at=f"{h:.3g}\u00a0s",
         ratio=f"{value:.2g}",
         interval=f"{low:.2g} to {high:.2g}" if math.isfinite(low) else "not known: too few blocks",
+        before_note=notes[0],
+        after_note=notes[1],
     )
 
 

@@ -271,12 +271,14 @@ export class Loop {
       p.textContent = text;
       return p;
     }));
-    const figures = [["before", t("loop_before"), found.before, found.span]];
+    const span = found.of_spread ? `${found.span}, ${t("loop_of_spread")}` : found.span;
+    const note = (k) => (found.no_more_than_noise[k] ? `${span}; ${t("loop_no_more")}` : span);
+    const figures = [["before", t("loop_before"), found.before, note(0)]];
     if (found.after) {
-      figures.push(["after", t("loop_after"), found.after, found.span]);
+      figures.push(["after", t("loop_after"), found.after, note(1)]);
       figures.push(["", t("loop_ratio"), found.ratio, t("loop_interval", { interval: found.interval })]);
     }
-    figures.push(["", t("loop_floor"), found.floor, found.span]);
+    figures.push(["", t("loop_floor"), found.floor, span]);
     $("figures").replaceChildren(...figures.map(([kind, name, value, small]) => {
       const box = document.createElement("div");
       box.className = kind;
@@ -285,12 +287,17 @@ export class Loop {
         e.textContent = text;
         box.append(e);
       }
-      const note = document.createElement("small");
-      note.textContent = small;
-      box.lastChild.append(note);
+      const remark = document.createElement("small");
+      remark.textContent = small;
+      box.lastChild.append(remark);
       return box;
     }));
     this.movie(found.parts, found.effects.length > 0);
+    const constants = found.constants.map((c) => [c.name, c.meaning, `${c.value} ${c.unit}`.trim()]);
+    const columns = [t("loop_constant"), t("loop_meaning"), t("loop_value")];
+    $("constants").replaceChildren(table(t("loop_constants"), columns, constants));
+    explain($("constants"), [[t("loop_value"), t("loop_brackets")]]);
+    $("constants").hidden = !constants.length;
     const errors = found.errors.map((e) => [e.horizon, e.before, ...(found.after ? [e.after] : []), e.floor]);
     const heads = [t("loop_horizon"), t("loop_before"), ...(found.after ? [t("loop_after")] : []), t("loop_floor")];
     $("errors").replaceChildren(table(t("loop_errors"), heads, errors));
@@ -316,6 +323,8 @@ export class Loop {
       Object.assign(shown, { controls: true, loop: true, muted: true, autoplay: !matchMedia("(prefers-reduced-motion: reduce)").matches });
       shown.setAttribute("aria-label", part.title);
     } else shown.alt = part.title;
+    $("movie").append(shown);
+    if (!film) return; // a picture has its own legend
     const titles = document.createElement("div");
     titles.className = "panels";
     titles.append(...[t("loop_measured"), t("loop_known"), ...(more ? [t("loop_after")] : [])].map((text) => {
@@ -323,7 +332,7 @@ export class Loop {
       title.textContent = text;
       return title;
     }));
-    $("movie").append(titles, shown);
+    $("movie").prepend(titles);
   }
 }
 
