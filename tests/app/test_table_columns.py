@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -85,7 +88,7 @@ def test_a_pendulum_with_a_measured_torque_is_fitted() -> None:
     assert m.names == ("theta",) and tuple(m.inputs) == (TORQUE,)
     fit = udd.fit(m, driven_model(m, 0.7, 0.08))
     # The table was made with 12 sin(theta) and 4 times the torque.
-    assert fit.parameters["length"] / 0.7**2 * 9.81 == pytest.approx(12.0, rel=0.1)
+    assert 9.81 / fit.parameters["length"] == pytest.approx(12.0, rel=0.1)
     assert fit.parameters["gain"] == pytest.approx(4.0, rel=0.1)
 
 
@@ -127,3 +130,21 @@ def test_what_was_measured_is_kept_when_a_job_fails(tmp_path: Path, monkeypatch:
     with pytest.raises(UddError, match="length in cm"):
         worker._loop({"file": "upload.csv", "film": False}, lambda _message: None)
     assert worker._kept() == [{"name": "measurement.csv", "title": "The measured motion"}]
+
+
+def test_a_fault_of_the_program_is_called_so(tmp_path: Path) -> None:
+    code = (
+        "from udd.app import worker\n"
+        "def broken(asked, tell): raise IndexError('inside')\n"
+        "worker.JOBS['loop'] = broken\n"
+        "worker.main()"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdin=pipe, stdout=pipe, text=True
+    ) as job:
+        assert job.stdin is not None and job.stdout is not None
+        job.stdin.write('{"kind": "loop"}\n')
+        job.stdin.flush()  # and left open: the process ends with its input
+        said = json.loads(job.stdout.readline())
+    assert said["error"].startswith("A fault of the program ended the job (IndexError).")

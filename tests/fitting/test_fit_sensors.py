@@ -246,3 +246,15 @@ def test_where_a_sensor_has_no_value_a_start_is_asked_for() -> None:
     with pytest.raises(FitError, match="no value around h = 0, w = 0: say where the motion starts"):
         udd.fit(measured, level)
     assert abs(udd.fit(measured, level, state0={"h": 2.0}).parameters["k"] - 4.0) < 1e-3
+
+
+@pytest.mark.parametrize("ruler", [0.5, 0.75, 0.9])
+def test_a_gyroscope_measures_the_length_whatever_was_given_to_begin_with(ruler: float) -> None:
+    from udd.measurement import read_gyroscope
+
+    seen = read_gyroscope(udd.examples.path("phone.csv"))
+    fit = udd.fit(seen, udd.Pendulum(ruler).with_gyroscope())
+    assert abs(fit.parameters["length"] - 0.8) < 4 * fit.errors["length"] < 0.001
+    # The inertia that is given stays: only the length is fitted.
+    heavy = udd.fit(seen, udd.Pendulum(ruler, inertia=0.58).with_gyroscope())
+    assert heavy.parameters["length"] == pytest.approx(0.58 / 0.8, rel=1e-3)

@@ -12,7 +12,7 @@ DRIVE, TORQUE = "W", "u"
 
 #: Meaning and unit of the constants of models with a gyroscope or an input.
 CONSTANTS = {
-    "length": ("length of the pendulum", "m"),
+    "length": ("length of a point mass with this period", "m"),
     "k0": ("viscous friction", "m²/s"),
     "k1": ("friction coefficient at rest", "m²/s"),
     "k2": ("how fast friction falls with the speed of rotation", "m²"),
@@ -42,7 +42,8 @@ def driven_model(measurement: Measurement, length: float | None, R: float) -> Mo
     assert length is not None  # the caller has asked for it
     pendulum = Pendulum(length)
     # A gain converts the input from its own unit, so a voltage or a current serves as well.
-    rate = f"(-{pendulum.g!r}*length*sin(theta) - k0*Omega)/{pendulum.inertia!r} + gain*{TORQUE}"
+    # A point mass: its length follows from the period, whatever length was given to begin with.
+    rate = f"(-{pendulum.g!r}*length*sin(theta) - k0*Omega)/length^2 + gain*{TORQUE}"
     zero, seen = ("theta0", "theta") if measurement.names == ("theta",) else ("bias", "Omega")
     return FormulaModel(
         ["Omega", "theta"],

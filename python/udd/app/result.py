@@ -6,6 +6,8 @@ import math
 from typing import Any
 
 from udd.errors import ModelError
+from udd.fitting.diagnostics import units
+from udd.fitting.parameter_meanings import meaning
 from udd.models import Disk
 from udd.models.serialization import model_to_dict
 from udd.report import tables, wording
@@ -51,12 +53,20 @@ def of(discovery: Any) -> dict[str, Any]:
 
 def _constants(discovery: Any) -> list[dict[str, str]]:
     """Return the fitted constants of the model: name, meaning, value with its standard error, unit."""
-    rows = []
-    for row in tables.parameters(discovery):
-        name, meaning, value, unit = (text_of(row[key]) for key in ("name", "meaning", "after", "unit"))
-        if meaning == name:  # of a model that the page wrote itself
-            meaning, unit = CONSTANTS.get(name, (meaning, unit))
-        rows.append({"name": name, "meaning": meaning, "value": value, "unit": unit})
+    fit, rows = discovery.fit, []
+    for name, unit in units(fit).items():
+        if name not in fit.model.parameters or "." in name:
+            continue  # a parameter of the camera, or of an effect, which the formula shows
+        words, known_unit = CONSTANTS.get(name, ("", "")) if fit.model.profile.written else ("", "")
+        value = wording.with_error(fit.parameters[name], fit.errors[name])
+        rows.append(
+            {
+                "name": text_of(wording.pretty(name)),
+                "meaning": words or meaning(name, discovery.measurement.kind),
+                "value": text_of(value),
+                "unit": text_of(wording.pretty(unit or known_unit)),
+            }
+        )
     return rows
 
 

@@ -60,6 +60,11 @@ def main() -> None:
         )
     except MemoryError:
         tell({"error": "This takes more memory than a job may have."})
+    except Exception as error:
+        kind = type(error).__name__
+        fault = f"A fault of the program ended the job ({kind}). Please report it, with the file."
+        tell({"error": fault, "parts": _kept() if asked.get("film") else []})
+        raise
 
 
 def _kept() -> list[dict[str, str]]:

@@ -120,8 +120,9 @@ class Pendulum(CompiledModel):
         -------
         Model
             With the sensors ``Omega`` [rad/s] and, with `angle`, ``theta`` [rad]; ``length, k0, bias`` and
-            ``theta0`` are its parameters. Gravity and the inertia are numbers in its equation: a fit cannot
-            distinguish them from the length.
+            ``theta0`` are its parameters. Gravity is a number in its equation, because a fit cannot
+            distinguish it from the length. So is an inertia that was given. Without one the pendulum is a
+            point mass, whose inertia is its fitted length squared.
 
         Raises
         ------
@@ -139,11 +140,15 @@ class Pendulum(CompiledModel):
         >>> fit = udd.fit(seen, udd.Pendulum(0.52).with_gyroscope())
         >>> bool(abs(fit.parameters["bias"] - 0.03) < 4 * fit.errors["bias"])
         True
+        >>> round(fit.parameters["length"], 3)
+        0.5
         """
         if self.effects:
             names = ", ".join(effect.name for effect in self.effects)
             raise ModelError(f"a pendulum with a gyroscope is a model of your own, which cannot have {names}")
-        rate = f"(-{self.g!r}*length*sin(theta) - k0*Omega)/{self.inertia!r}"
+        point_mass = self.inertia == self.length**2
+        inertia = "length^2" if point_mass else repr(self.inertia)
+        rate = f"(-{self.g!r}*length*sin(theta) - k0*Omega)/{inertia}"
         zero = {"theta0": 0.0} if angle else {}
         return FormulaModel(
             ["Omega", "theta"],
