@@ -64,7 +64,7 @@ def checked_arguments(function: Callable[P, R] | None = None, *, error: type[Udd
     function : callable
         A function whose annotations are texts (``from __future__ import annotations``).
     error : type of UddError
-        What is raised; default :class:`udd.errors.ModelError`.
+        Class of the error. The default is :class:`udd.errors.ModelError`.
 
     Returns
     -------

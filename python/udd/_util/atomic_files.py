@@ -90,7 +90,7 @@ def replacing(target: Path, suffix: str = "") -> Iterator[str]:
 
 
 def _new_file(target: Path, suffix: str) -> str:
-    """Make an empty file beside the target; the system takes the user's umask from its mode."""
+    """Make an empty file next to the target; the system takes the user's umask from its mode."""
     while True:
         name = target.parent / f".{target.name}.{secrets.token_hex(6)}{suffix}"
         try:

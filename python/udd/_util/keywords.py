@@ -21,7 +21,7 @@ def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     Parameters
     ----------
     **names : str
-        What each old name is called now.
+        New name for each old name.
     """
 
     def decorator(function: Callable[P, R]) -> Callable[P, R]:

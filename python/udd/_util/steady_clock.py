@@ -34,7 +34,7 @@ class SteadyClock:
     Attributes
     ----------
     start, period : float
-        Of the times before they were rounded, s.
+        First time and interval of the times before they were rounded, s.
     rounding : float
         The resolution of the times as they are, s.
     """

@@ -155,7 +155,7 @@ class _Calculator:
         self.size = 0
         """Bytes of its last answer."""
         self.ready = False
-        """Whether it can take another question."""
+        """True if it can take another question."""
 
     @property
     def age(self) -> float:

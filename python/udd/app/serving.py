@@ -29,11 +29,11 @@ def serve(
     fragment : str
         The run to open with: the part of a link after #.
     browser : bool
-        Whether to open a browser.
+        If True, open a browser.
     ready : callable
         Called with the link once the server listens.
     classroom : bool
-        Whether the page only simulates: no files, no films, a few pages for each address.
+        If True, the page only simulates: no files, no films, a few pages for each address.
 
     Raises
     ------

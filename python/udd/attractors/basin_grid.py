@@ -74,13 +74,14 @@ def basins(
     section : str, optional
         The surface, as :func:`udd.poincare` takes it; by default ``"z"`` (``"Z"``, ``"theta"``).
     direction : {"up", "down", "both"}, optional
-        In which direction it is crossed; by default upward.
+        Direction of the crossings that count. The default is upward.
     n : int
-        By how many section points a motion is recognised, at least 12; periods up to a third of this are.
+        Number of section points by which a motion is recognised, at least 12. Periods up to a third of this
+        number are recognised.
     transient : int
         How many points are left out before.
     max_extension : int
-        What is not clear is followed further, up to this many times ``transient + n`` points.
+        An unclear motion is followed further, up to this many times ``transient + n`` points.
     t_max : float, optional
         The longest time for the first ``transient + n`` points; by default generous.
     **options
@@ -95,7 +96,7 @@ def basins(
     xarray.Dataset
         Over the components of the grid:
 
-        - ``attractor``: its number, from 1 on, the largest basin first; 0 where there is none;
+        - ``attractor``: its number, from 1 on, the largest basin first; 0 without an attractor;
         - ``outcome``: how it ended.
 
         Over ``number``, the attractors: ``kind`` (equilibrium, periodic, aperiodic), ``period`` in section
@@ -143,7 +144,7 @@ def basins(
     smaller where the basins are large. With f ~ distance^alpha, the basins' boundary has the dimension of the
     grid less alpha (Grebogi et al., Phys. Lett. A 99 (1983) 415 [23]). Initial states without an attractor or
     a final outcome are left out. The exponent is NaN where too few distances are small enough, as on a coarse
-    grid. Where the rates depend on time, every motion begins at time 0 again when it is followed further.
+    grid. If the rates depend on time, every motion begins at time 0 again when it is followed further.
 
     Examples
     --------

@@ -22,7 +22,7 @@ class InitialStates:
     Attributes
     ----------
     place : ndarray of int (jobs,)
-        Of its attractor in the register, -1 where there is none.
+        Place of its attractor in the register, or -1.
     outcome : ndarray (jobs,)
         How it ended.
     """

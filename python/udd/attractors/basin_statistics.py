@@ -20,7 +20,7 @@ def basin_fractions(ends: NDArray[np.int32], count: int) -> tuple[Floats, Floats
     Parameters
     ----------
     ends : ndarray of int
-        What becomes of each point of the grid, below `count`; -1 where that is not known.
+        End of each point of the grid, below `count`. It is -1 if the end is not known.
     count : int
 
     Returns

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 class DiagramOptions(RunOptions, TypedDict, total=False):
-    """Keyword arguments of :func:`bifurcation` beside those of all runs."""
+    """Keyword arguments of :func:`bifurcation` in addition to those of all runs."""
 
     max_extension: int
     perturbation: float
@@ -124,7 +124,7 @@ def bifurcation(
         - ``period``: the number of distinct points (the rounds of a cycle, 1 at rest). It is 0 if the motion
           is not periodic, and -1 without a verdict;
         - ``period_time``: how long a period takes;
-        - ``attractor``: a label from 1 on, 0 where there is none; attractors of neighbouring values have the
+        - ``attractor``: a label from 1 on, 0 without an attractor; attractors of neighbouring values have the
           same one where the points hardly move;
         - ``symmetric``: 1 where it is its own mirror image under the model's symmetry, 0 where not, -1 where
           there is no symmetry or no attractor;
@@ -161,7 +161,7 @@ def bifurcation(
     `max_extension` before the difference counts as hysteresis. A job that leaves the disk (or fails) on the
     way up or down begins at its initial state again with the next value.
 
-    The numbers do not depend on the number of threads. Where the rates depend on time, every run begins at
+    The numbers do not depend on the number of threads. If the rates depend on time, every run begins at
     time 0, carried over or not.
 
     Examples

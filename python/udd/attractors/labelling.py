@@ -58,7 +58,7 @@ def tell(
     places: NDArray[np.intp],
     reach: float,
 ) -> DiagramLabels:
-    """Tell the attractors apart, value by value; `places` (paths, starts, values) numbers the jobs."""
+    """Distinguish the attractors, value by value; `places` (paths, starts, values) numbers the jobs."""
     diagram_labels = DiagramLabels.nothing(places.size, places.shape[2])
     is_decided = decided(crossings, verdicts)
     tracks = AttractorMatcher(reach)

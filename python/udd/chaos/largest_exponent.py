@@ -115,7 +115,7 @@ def lyapunov(
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
         bar shows after 2 s in a terminal or a notebook.
     with_error : bool
-        Whether to return the standard error too.
+        If True, return the standard error too.
 
     Returns
     -------

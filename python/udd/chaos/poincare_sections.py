@@ -70,7 +70,7 @@ class Section(Drawable):
     t_end : float, or ndarray, shape (...)
         The time of that.
     model : Model
-        What was run, before parameters were varied.
+        The model of the orbits, before parameters were varied.
 
     See Also
     --------
@@ -186,7 +186,8 @@ class Section(Drawable):
         Parameters
         ----------
         component : str, optional
-            Of what the maxima are; by default the height z of the DLE, Z of a disk, theta of a pendulum.
+            Component with the maxima. The default is the height z of the DLE, Z of a disk, theta of a
+            pendulum.
 
         Returns
         -------
@@ -327,7 +328,7 @@ def poincare(
     Notes
     -----
     The Taylor method's polynomials are as accurate as its steps; a crossing is a zero of the expression on
-    such a polynomial. Where the expression may have several zeros, interval arithmetic
+    such a polynomial. If the expression may have several zeros, interval arithmetic
     divides the step until each part has at most one, however fast the expression changes. A surface that is
     only touched is not crossed. A smooth pulse of the law that is shorter than a step may need ``max_step``.
 

@@ -107,7 +107,7 @@ class RestTest:
         rest = equilibrium_near(self.model, state, self.kept, 0.0)
         if rest is None:
             return None
-        # Where runs no longer come nearer: the error of a component moves the others.
+        # Runs no longer come nearer then: the error of a component moves the others.
         noise = 10.0 * (self.atol + self.rtol * np.abs(rest.state))
         fastest = float(np.abs(rest.eigenvalues).max(initial=0.0))
         if fastest > 0.0:

@@ -61,8 +61,8 @@ class Spectrum(Drawable):
         The Kaplan-Yorke dimension: the number of exponents, the last one in part, that add up to zero. NaN of
         an orbit that escapes.
     verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "escapes", "undecided"}
-        What the orbit does in the end, wherever its origin is and however large it is. At an equilibrium the
-        orbit comes nearer to it for several times its slowest decay. A periodic orbit comes back, modulo
+        Final motion of the orbit. Neither the origin nor the size of the motion matters. At an equilibrium
+        the orbit comes nearer to it for several times its slowest decay. A periodic orbit comes back, modulo
         turns of angles, and one exponent is zero; a running pendulum is one. An orbit that escapes has a
         component, not an angle, that grows without bound. Chaos has a largest exponent at least four standard
         errors above zero, and neighbours that part faster than as the square of the time (in typical times);
@@ -162,7 +162,7 @@ def lyapunov_spectrum(
         Time at the start that is left out in any case, by default 400, or 100 s (less for a short `t`).
         Should the first half of what follows disagree with the second, it is left out too.
     state0 : array_like, shape (dim,), optional
-        Initial state. Where several attractors coexist it decides between them.
+        Initial state. If several attractors coexist, it decides between them.
     section : str or list of str, optional
         A surface, or several, as in :func:`udd.poincare`, whose crossings are wanted too. The result's
         `section` then holds the next 600 of them. They continue the orbit from the last state of the run,
@@ -205,8 +205,8 @@ def lyapunov_spectrum(
     -----
     Tangents are the derivative part of a run over dual numbers, made orthonormal after every step
     (G. Benettin et al., Meccanica 15 (1980) 9). Chaos is followed on, without tangents, for the time `t` in
-    all, or 36,000 section points. Where it ends on a periodic orbit or at rest, or the orbit spirals there
-    slowly, the exponents are taken again from what it has settled on. Longer transients are not seen as such:
+    all, or 36,000 section points. If it ends on a periodic orbit or at rest, or spirals there slowly, the
+    exponents are computed again for the final motion. Longer transients are not seen as such:
     their mean is 8200 near w = 4.5, and 27000 at B = 0.2, w = 3.7.
 
     References
@@ -351,8 +351,8 @@ def _zeros(run: _Run, orbits: _core._Orbits) -> int:
 def _positive(orbits: _core._Orbits, time_scale: float) -> bool:
     """Return True if neighbouring orbits separate faster than by any power of the time up to the second.
 
-    Where energy is kept those of regular motion part in proportion to time. The scatter of an exponent's
-    means does not show that: all of them are above zero.
+    If energy is conserved, neighbours of a regular motion separate in proportion to time. The scatter of an
+    exponent's means does not show that: all of them are above zero.
     """
     value, time = orbits["value"][0, 0], float(orbits["time"][0])
     grown = value * time > _POWER * np.log1p(time / time_scale)

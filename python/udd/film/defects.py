@@ -170,8 +170,8 @@ class Defects:
 def source_of_pixels(camera: Camera, defects: Defects) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the place (x, y) of each pixel of the distorted picture in a true-to-scale one.
 
-    A pinhole camera at `distance` looks at the pivot from beside and below. The lens then moves points inward
-    by the factor 1 - lens r^2, r being the distance from the picture's middle (corner: 1).
+    A pinhole camera at `distance` looks at the pivot from the side and from below. The lens then moves points
+    inward by the factor 1 - lens r^2, r being the distance from the picture's middle (corner: 1).
     """
     width, height = camera.size
     middle = np.array([(width - 1) / 2, (height - 1) / 2])

@@ -49,7 +49,7 @@ class Layout:
     colours : tuple of (int, int, int)
         sRGB codes.
     standard : bool
-        Whether these are the four marks of the paper's disk.
+        True for the four marks of the paper's disk.
     """
 
     places: tuple[complex, ...]

@@ -30,7 +30,7 @@ _LETTERS = {"t": "t", "y": "Y", "z": "Z"}
 
 
 def guessed(table: Table) -> list[str]:
-    """Return the role of each column of a table, empty where there is none; each role once."""
+    """Return the role of each column of a table, or an empty text; each role occurs once."""
     roles = [_role(heading) for heading in table.headings]
     rates = [k for k, role in enumerate(roles) if role == "Omega"]
     if len(rates) > 1:

@@ -21,7 +21,7 @@ def driven_disk(
         (R^2/2 + Y^2 + Z^2) dOmega/dT = (g + dW/dT) Y - k Omega - Z W Omega,   k = max(k1 - k2 |Omega|, k0)
         dY/dT = Z Omega    dZ/dT = W - Y Omega    dbeta/dT = Omega
 
-    Where the drive changes the disk is accelerated with it, which adds to gravity. ``W_rate`` is
+    A changing drive accelerates the disk, which adds to gravity. ``W_rate`` is
     ``W.rate()`` of the measured :class:`udd.InputSignal`.
 
     Parameters

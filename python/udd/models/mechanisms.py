@@ -188,7 +188,7 @@ def pendulum_chain(
     g : float
         Gravity [m/s^2].
     motors : bool
-        Whether each joint has a motor whose torque is a measured input, ``tau1, ...`` [N m].
+        If True, each joint has a motor whose torque is a measured input, ``tau1, ...`` [N m].
 
     Returns
     -------

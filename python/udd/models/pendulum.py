@@ -114,7 +114,7 @@ class Pendulum(CompiledModel):
         Parameters
         ----------
         angle : bool
-            Whether the angle is measured too.
+            If True, the angle is measured too.
 
         Returns
         -------

@@ -66,7 +66,7 @@ def model_from_dict(data: object, *, fitted: bool = False) -> Model:
     ----------
     data : mapping
     fitted : bool
-        Whether it may come from a fit: friction and drive may then be outside their physical ranges, as in
+        If True, it may come from a fit: friction and drive may then be outside their physical ranges, as in
         :meth:`udd.Model.with_parameters`.
 
     Raises

@@ -99,7 +99,7 @@ def basins(result: xr.Dataset, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     result : xarray.Dataset
-        Of :func:`udd.basins`, over two components.
+        Result of :func:`udd.basins`, over two components.
     ax : Axes, optional
 
     Returns

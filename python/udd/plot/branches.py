@@ -56,7 +56,7 @@ def branches(
     component : str, optional
         Which component of the state; by default the first.
     view : {"section", "extremes", "period"}
-        Of cycles: where they cross a section, between which values the component moves, or their periods.
+        Values of cycles: crossings of a section, extremes of the component, or periods.
     section : str, optional
         The section, upward; by default that of :func:`udd.poincare`.
 

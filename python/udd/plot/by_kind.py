@@ -56,7 +56,8 @@ def draw(result: Any, ax: Axes | None = None, **options: Any) -> Axes:
     Parameters
     ----------
     result : object
-        What a function of the package returns; of :func:`udd.bifurcation` and :func:`udd.basins` the dataset.
+        Result of a function of the package, such as the dataset of :func:`udd.bifurcation` or
+        :func:`udd.basins`.
     ax : Axes, optional
     **options
         Options of the function that draws it.

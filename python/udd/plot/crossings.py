@@ -28,7 +28,7 @@ def poincare(result: Section, ax: Axes | None = None, *, components: tuple[str, 
     Parameters
     ----------
     result : Section
-        Of :func:`udd.poincare`; the points of many orbits are drawn together.
+        Result of :func:`udd.poincare`. The points of many orbits are drawn together.
     ax : Axes, optional
     components : tuple of str, optional
         Which components lie across and up; by default the first two that vary, or the time and the one.
@@ -76,7 +76,7 @@ def return_map(result: Section, ax: Axes | None = None, *, component: str | None
     Parameters
     ----------
     result : Section
-        Of :func:`udd.poincare`; ask it for ``"maxima of z"`` to see Lorenz's cusp map.
+        Result of :func:`udd.poincare`. Ask it for ``"maxima of z"`` to see Lorenz's cusp map.
     ax : Axes, optional
     component : str, optional
         By default the first that varies; of a section of maxima what is at its maximum.

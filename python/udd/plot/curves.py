@@ -45,7 +45,7 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     Parameters
     ----------
     curve : Curve
-        Of one coordinate, or of two.
+        Curve over one coordinate, or over two.
     ax : Axes, optional
     formulas : sequence of Formula
         At most three, drawn for comparison; each may use the model's other parameters to the same degree.

@@ -133,8 +133,8 @@ def spectrum(result: Any, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     result : Spectrum or Covariant
-        Of a spectrum each exponent with its 95 % interval; of covariant vectors the exponents of finite time
-        over time, with their means.
+        A spectrum shows each exponent with its 95 % interval. Covariant vectors show the exponents of finite
+        time over time, with their means.
     ax : Axes, optional
 
     Returns

@@ -27,7 +27,7 @@ def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes
     ----------
     image : ndarray (height, width, 3)
     pixels : udd.tracking.Pixels
-        Where the disk is in each frame, in pixels.
+        Place of the disk in each frame, in pixels.
     frame : int
         The frame that `image` shows.
     ax : Axes, optional

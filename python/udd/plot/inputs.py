@@ -35,7 +35,7 @@ class Motion:
     columns : dict of str to ndarray (n,)
     model : Model or None
     radius : float or None
-        Of the disk, m.
+        Radius of the disk, m.
     """
 
     title: str

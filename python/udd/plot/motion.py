@@ -106,7 +106,7 @@ def orbit(result: Any, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     result : Trajectory, Measurement or Fit
-        Of a pendulum not a measurement, which holds no angular velocity.
+        For a pendulum it must not be a measurement, which has no angular velocity.
     ax : Axes, optional
 
     Returns

@@ -28,8 +28,8 @@ _SHORT = {"t": "time T", "R": "R", "beta": "β mod 2π", "Omega": "Ω", "theta":
 def residual_map(fit: Any, ax: Axes | None = None, *, before: Any = None) -> Axes:
     """Draw the mean residual of every equation (rows) along every coordinate (columns).
 
-    Where a model is right every band holds the zero line. A cell is framed where one does not: where the
-    chance of the means' scatter is below 0.1 % over all cells together.
+    If a model is right, every band contains the zero line. A cell has a frame if the
+    probability of the means' scatter by chance is below 0.1 %, over all cells together.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ def cycle(result: Any, ax: Axes | None = None, *, components: tuple[str, str] | 
     Parameters
     ----------
     result : PeriodicOrbit, Connection, CycleConnection or Crisis
-        Of a crisis the saddle cycle that the attractor meets.
+        For a crisis it is the saddle cycle that the attractor meets.
     ax : Axes, optional
     components : (str, str), optional
         Across and up; by default the first two components of the state.

@@ -96,7 +96,7 @@ def new_axes(ax: Axes | None = None, projection: str | None = None, size: tuple[
 def legend_above(
     ax: Axes, handles: Sequence[Any] | None = None, words: Sequence[str] | None = None, **options: Any
 ) -> None:
-    """Put the legend above the axes, in as many columns as fit: beside the axes it would squeeze them."""
+    """Put the legend above the axes, in as many columns as fit: next to the axes it would squeeze them."""
     if handles is None or words is None:
         handles, words = ax.get_legend_handles_labels()
     width = ax.get_window_extent().width

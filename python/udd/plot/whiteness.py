@@ -37,7 +37,7 @@ def whiteness(
     channel : str, optional
         One of the measurement's columns; by default the first.
     colour, name : str
-        Of the line, in the legend.
+        Name of the line in the legend.
 
     Returns
     -------

@@ -170,7 +170,9 @@ def _mp4(panels: list[Panel], t: Array, measurement: Measurement, film: Path) ->
 
     require_video()
     if "px_per_m" not in measurement.meta:
-        raise UddError(f"the measurement was not tracked in a film, so {film} cannot be shown beside a model")
+        raise UddError(
+            f"the measurement was not tracked in a film, so {film} cannot be shown next to a model"
+        )
     rate = Fraction((len(t) - 1) / float(t[-1] - t[0]) / _SLOWER).limit_denominator(1000)
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "movie.mp4"

@@ -171,7 +171,7 @@ def errors_table(discovery: Discovery) -> Table:
 
 
 def columns_with(columns: dict[str, Column], discovery: Discovery) -> dict[str, Column]:
-    """Return the columns, without the one for an added effect if there is none."""
+    """Return the columns; that for an added effect only if an effect was added."""
     return {name: c for name, c in columns.items() if name != "after" or discovery.effects}
 
 

@@ -60,11 +60,11 @@ class Movie(Image):
     uri : str
         A film (``data:video/mp4``), or a drawing that moves (``data:image/svg+xml``).
     titles : tuple of str
-        Of its panels, from the left.
+        Titles of its panels, from the left.
     start, seconds : float
         Time at which the free runs start, and for how long they are shown, s.
     filmed : bool
-        Whether the first panel is the film itself.
+        True if the first panel is the film itself.
     """
 
     titles: tuple[str, ...]
@@ -138,7 +138,7 @@ class Table(OneLine):
     summary : str
         The line that is shown while it is folded; "" if it cannot be folded.
     open : bool
-        Whether it begins unfolded.
+        True if it begins unfolded.
     marked : frozenset of int
         The rows that stand out.
     """
@@ -214,7 +214,7 @@ class Report:
     command : str, optional
         How it was made.
     path : Path, optional
-        Where it was written as a page.
+        Place of the page, if it was written.
     """
 
     head: Head

@@ -117,9 +117,9 @@ def write(
     ----------
     discovery : Discovery
     path : path
-        Of the page; an older one is replaced once the new one is complete.
+        File of the page. An older one is replaced when the new one is complete.
     film, source, command
-        As of :func:`report_of`.
+        As for :func:`report_of`.
 
     Returns
     -------

@@ -47,7 +47,7 @@ def write_refused(
     reason : str
         The tracker's message.
     path : path
-        Of the page (HTML).
+        HTML file to write.
     given : mapping
         Options of the tracker, with their names.
     command : str, optional

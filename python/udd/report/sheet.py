@@ -37,7 +37,7 @@ def write_sheet(
     kind : {"marks", "tags"}
         The four colour marks, or four ArUco tags.
     path : path
-        Of the PDF; the config has the same name with the ending ``.toml``.
+        File of the PDF. The config has the same name with the ending ``.toml``.
     radius : float, optional
         Radius of the disk [m].
     paper : {"A4", "A3", "letter"}, optional

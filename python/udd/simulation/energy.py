@@ -65,7 +65,7 @@ def energy_balance(run: Trajectory) -> EnergyBalance:
     Parameters
     ----------
     run : Trajectory
-        Of a disk, a pendulum or the DLE.
+        Run of a disk, a pendulum or the DLE.
 
     Returns
     -------

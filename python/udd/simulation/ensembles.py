@@ -50,7 +50,7 @@ class Ensemble(Drawable):
     t_end : ndarray, shape (...)
         Time of the last state.
     model : Model
-        What was run, before parameters were varied.
+        The model of the runs, before parameters were varied.
 
     See Also
     --------

@@ -1,7 +1,7 @@
 """Quantities of sweeps: a table from a quantity's name to the function that computes it.
 
-Such a function takes the model, for each of n trajectories a row of all parameters and an initial state, the
-options, and how many threads it may use (0: one per core). It returns arrays whose first axis is the
+Such a function takes the model, n rows of all parameters, n initial states, the options, and the number of
+threads (0: one per core). It returns arrays whose first axis is the
 trajectory. A trajectory that fails has an outcome and NaN, and disturbs no other.
 """
 

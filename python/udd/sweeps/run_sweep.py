@@ -39,12 +39,12 @@ def sweep(
     Parameters
     ----------
     spec : SweepSpec
-        What is computed, and over which values.
+        The quantity, and the values to compute it at.
     executor : object with ``submit``, optional
-        Who does the work: a `concurrent.futures` executor of threads or of processes, Dask's
+        Executor of the work: a `concurrent.futures` executor of threads or of processes, Dask's
         ``Client.get_executor()``. By default this process, chunk after chunk, on all cores.
     store : path or zarr.Group, optional
-        Where the result is written, chunk by chunk as it is found; the workers must reach it. A sweep that
+        Store to which the result is written, chunk by chunk. The workers must reach it. A sweep that
         stopped goes on from there. Without one the result stays in memory.
     progress : bool or callable, optional
         True shows a progress bar, False none; a function gets the state of the work as a text. By default a
@@ -83,7 +83,7 @@ def sweep(
     -----
     The values do not depend on the executor, the store, the chunks or the number of threads, to the last
     bit. A chunk is a pure function of its part of the spec. It is written to its own region of the store,
-    which no other chunk shares, and then its flag in the array ``done``; so a sweep that is killed at any
+    which no other chunk shares, and then its flag in the array ``done``. So a sweep that is killed at any
     moment and run again gives the same files.
 
     A trajectory that fails is no error: it has an outcome other than "finished", and NaN.

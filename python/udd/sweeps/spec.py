@@ -42,7 +42,7 @@ class SweepSpec:
     Parameters
     ----------
     quantity : {"lyapunov", "spectrum", "final_state", "outcome"}
-        What is computed of every trajectory.
+        The quantity that is computed for every trajectory.
     model : Model
         The model; what `over` names is varied in it.
     over : mapping of str to array_like

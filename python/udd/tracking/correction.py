@@ -23,14 +23,14 @@ class Correction:
     turns : int
         Quarter turns counter-clockwise, once the picture is steady.
     mirrored : bool
-        Whether left and right are exchanged at the end.
+        True if left and right are exchanged at the end.
     factor, shift : ndarray of complex (n,)
         A point z of the steady picture lies at ``factor[k] z + shift[k]`` in frame k; empty if the camera was
         at rest.
     gain : ndarray (n,)
         Light of frame k against that of the steady picture; empty if it is always the same.
     full_range : bool
-        Of the brightness codes.
+        True if the brightness codes go from 0 to 255.
     """
 
     turns: int = 0

@@ -28,11 +28,11 @@ class Sigma:
     Attributes
     ----------
     pivot : float
-        Of each of its coordinates [pixels].
+        Standard error of each of its coordinates [pixels].
     scale : float
         [pixels per metre]
     layout : float
-        Of each coordinate of a mark [m].
+        Standard error of each coordinate of a mark [m].
     """
 
     pivot: float = 0.0

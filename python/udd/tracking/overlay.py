@@ -28,7 +28,7 @@ def overlay(video: str | os.PathLike[str], measurement: Measurement, path: str |
     video : path
         The film that was tracked.
     measurement : Measurement
-        What `udd.track` made of it, or read back from its file.
+        Result of `udd.track`, or read back from its file.
     path : path
         Film to write, ``.mp4`` or ``.mov``.
 

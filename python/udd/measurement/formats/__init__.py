@@ -1,4 +1,4 @@
-"""The files that a measurement may come in: one module for each kind, and the table that tells them apart."""
+"""File formats of measurements: a module for each format, and the table that distinguishes them."""
 
 from __future__ import annotations
 

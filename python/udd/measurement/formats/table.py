@@ -16,7 +16,7 @@ from .headings import Heading
 from .text_column import TextColumn
 
 _LONGEST = 200  # characters of a cell that is kept as text
-#: What people and programs put into an empty cell.
+#: Texts of people and programs for an empty cell.
 NOTHING = {"", "nan", "na", "n/a", "null", "none"}
 
 

@@ -30,7 +30,7 @@ def write_config(path: str | os.PathLike[str], config: Mapping[str, Any], *, com
     config : mapping
         Arguments of `udd.track` by name: ``pivot``, ``scale``, ``layout``, ..., each as it is given there.
     comment : str, optional
-        What to say at the head of the file.
+        Text at the head of the file.
 
     Raises
     ------

@@ -23,8 +23,8 @@ def sightings(
 ) -> list[Sight | None]:
     """Find the disk in each picture that shows all its marks (or, of four and more, all but one).
 
-    `scale` [pixels per metre] helps where little else tells marks from patches of the same colours. `still`:
-    of patches that stand still alone, or of those that do not; if not given, of those, else of all.
+    `scale` [pixels per metre] helps if little else distinguishes marks from patches of the same colours.
+    `still`: use only patches at rest, or only moving ones; if not given, moving ones, else all.
     """
     patches = [coloured(p, layout) for p in pictures]
     chosen = [split(patches, bool(still)), *([patches] if still is None else [])]

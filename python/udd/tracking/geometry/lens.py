@@ -119,7 +119,7 @@ def calibrate(
         Picture positions of the marks [pixels], NaN where not seen.
     shape : (height, width) of the picture.
     body : complex, shape (marks,)
-        Where the marks are about, in any unit.
+        Approximate places of the marks, in any unit.
     curve, tilt : float, optional
         Given, not found: the lens's curvature; whatever is not None leaves the tilt away.
     """

@@ -32,7 +32,8 @@ def click(
     distance : float, optional
         Between two points that are asked for [m]; it sets the scale. Without, the disk's radius does.
     config : path or mapping, optional
-        What is known already (as for `udd.track`); it is not asked for, and is part of what is returned.
+        Options that are given already (as for `udd.track`). They are not asked for, and are part of the
+        result.
 
     Returns
     -------

@@ -68,9 +68,9 @@ class ClickSession:
     picture : Picture
         The frame.
     full_range : bool
-        Whether its brightness goes from 0 to 255.
+        True if its brightness goes from 0 to 255.
     known : mapping
-        What is known already, as in a config file; it is not asked for.
+        Options that are given already, as in a config file. They are not asked for.
     distance : float, optional
         Between the two points that are asked for [m].
 
@@ -327,7 +327,7 @@ def check(settings: Mapping[str, Any], distance: float | None) -> None:
 
 
 def _faults(marks: tuple[Patch, ...]) -> str:
-    """Return the fault of marks as a layout; empty if there is none."""
+    """Return the fault of marks as a layout, or an empty text."""
     if len(marks) < 2:
         return "One mark is not enough: click another, or take it back (Backspace) for the paper's own four."
     middle = complex(np.mean([m.centre for m in marks]))

@@ -14,11 +14,11 @@ MOST = 8  # frames to choose from
 
 
 def still_frames(look_over: Survey) -> list[Picture]:
-    """Frames of the survey, the calmest first, no two of one burst.
+    """Return frames of the survey, the calmest first, no two of one burst.
 
     A frame moves by the larger of its differences from both neighbours, so that a frame that a codec repeated
     is not calm. Hidden marks, or marks that blur makes pale, reduce the coloured samples; a coloured
-    background is the same in all frames. Where all frames are unusable, all of them.
+    background is the same in all frames. If all frames are unusable, all are returned.
     """
     calm: list[tuple[float, int, Picture]] = []
     for burst in look_over.bursts:

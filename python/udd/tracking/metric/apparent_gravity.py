@@ -62,7 +62,7 @@ def apparent_gravity(t: Array, values: Array, radius: float) -> ApparentGravity 
     values : ndarray (n, 3)
         Y, Z, beta, m and rad; NaN where the disk was not seen.
     radius : float
-        Of the disk, m.
+        Radius of the disk, m.
 
     Returns
     -------

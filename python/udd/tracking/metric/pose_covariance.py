@@ -39,7 +39,7 @@ def covariance(tracks: Tracks, look: DiskAppearance) -> Array:
 def add_shared_errors(covariance: Array, centre_sigma: float, shared: Sequence[Array]) -> Array:
     """Add errors that move all marks together, and the error of the centre, to the covariance.
 
-    Where the centre is among the marks only the rim says; what it is off by turns with the disk. `shared`
+    Only the rim gives the place of the centre among the marks. Its error rotates with the disk. `shared`
     are standard errors (n, 3) of u, v and beta, signed alike.
     """
     out = covariance + np.diag([centre_sigma**2, centre_sigma**2, 0.0])

@@ -26,9 +26,9 @@ def with_lower_bob(
     first, second : ndarray of complex (n,)
         Places of the bobs [pixels, v down], NaN if not seen.
     area : float
-        Of the lower bob [pixels].
+        Area of the lower bob [pixels].
     name : str
-        Of the film, for messages.
+        Name of the film, for messages.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def inserted_copies(t: Array, places: Places, flag: Sequence[str], noise: float)
     t : ndarray (n,)
         Times, s.
     places : ndarray of complex (n,)
-        Where the bob is, pixels; NaN where it is not known.
+        Place of the bob, pixels; NaN where it is not known.
     flag : sequence of str
         Those of the frames; copies that were recognised by their picture have one.
     noise : float
