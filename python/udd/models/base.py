@@ -89,10 +89,10 @@ class Model:
     The equations are parsed to a list of operations, which the core evaluates; nothing in them is executed.
 
     The equations have a kink or jump at each change of ``abs``, ``sign``, ``min``, ``max`` and ``where``.
-    Runs land on up to six such surfaces and record the events ``"kink"``, ``"jump"``, ``"stick"`` and ``"slip"``.
-    A surface on which the state can stick counts for two, all measured inputs together for one. Power series
-    restart there; derivatives pass through, with a jump's saltation matrix. Runs cross further surfaces by
-    small steps, and such a model has no power series.
+    Runs land on up to six such surfaces and record the events ``"kink"``, ``"jump"``, ``"stick"`` and
+    ``"slip"``. A surface on which the state can stick counts for two, all measured inputs together for one.
+    Power series restart there. Derivatives pass through, with the saltation matrix of a jump. Runs cross
+    further surfaces by small steps, and such a model has no power series.
 
     References
     ----------
