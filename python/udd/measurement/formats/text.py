@@ -36,7 +36,8 @@ def read(raw: bytes, given: list[str] | None, memory: MemoryLimit) -> list[Table
     Lines ``# key = value`` are about the whole file. Excel's byte order mark, its line ``sep=;``, decimal
     commas together with semicolons, tabs, blanks or in quotes, and empty rows are understood. Dates in ISO
     8601 become seconds since the first. Tracker's export of several points begins with ``#multi:`` and a row
-    of their names, and repeats the columns of each: they are called ``mass A x``. A row below the names may hold units. A last row that was cut off is passed over.
+    of their names, and repeats the columns of each: they are called ``mass A x``.
+    A row below the names may hold units. A last row that was cut off is passed over.
     """
     lines = Lines(raw, memory)
     meta: dict[str, Any] = {}
