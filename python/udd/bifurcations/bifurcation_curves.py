@@ -65,6 +65,11 @@ class Locus(Drawable):
         Why the curve ends, at its beginning and at its end.
     points : tuple of LocusPoint
         Cusps, Bogdanov-Takens points and others at which it changes, in their order along the curve.
+
+    See Also
+    --------
+    udd.locus : makes it.
+    udd.plot.locus : draw it.
     """
 
     kind: str
@@ -80,7 +85,7 @@ class Locus(Drawable):
         return len(self.values)
 
     def to_xarray(self) -> xr.Dataset:
-        """The curve as labelled arrays over ``place``: both parameters, every state and the coefficients.
+        """Return labelled arrays over ``place``: both parameters, every state and the coefficients.
 
         Returns
         -------
@@ -152,6 +157,11 @@ def locus(
     ModelError
         A point of another kind, or a parameter or option that cannot be used.
 
+    See Also
+    --------
+    udd.continuation : finds the first point.
+    udd.plot.locus : draw the curve.
+
     Notes
     -----
     Equilibria or cycles over two parameters are a surface, on which the zeros of the function that makes the
@@ -164,6 +174,10 @@ def locus(
     A curve of homoclinic orbits has its equilibrium among the unknowns, so it passes close to a fold of that
     equilibrium. If it ends in the fold, the end is "a saddle-node of equilibria" with its extrapolated place.
     If the orbit lies outside the bounds of the second parameter, the curve begins where it enters them.
+
+    References
+    ----------
+    Yu. A. Kuznetsov [24, 25].
 
     Examples
     --------

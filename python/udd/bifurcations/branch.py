@@ -37,7 +37,7 @@ AnyCurve = EquilibriumCurve | PeriodicOrbitCurve
 
 @dataclass(frozen=True, eq=False)
 class BifurcationPoint(Drawable):
-    """A bifurcation point of a branch.
+    """Bifurcation point of a branch.
 
     Attributes
     ----------
@@ -63,6 +63,16 @@ class BifurcationPoint(Drawable):
         from the angle of the multipliers), else NaN.
     lyapunov_coefficient : float
         The first Lyapunov coefficient of a Hopf bifurcation, else NaN.
+
+    See Also
+    --------
+    udd.continuation : finds it on a branch.
+    udd.locus : follows it over a second parameter.
+    udd.plot.branches : draw the branch with its points.
+
+    References
+    ----------
+    Kinds and normal forms: Yu. A. Kuznetsov [24].
     """
 
     kind: str
@@ -111,7 +121,7 @@ class BifurcationPoint(Drawable):
 
 @dataclass(frozen=True, eq=False)
 class Branch(Drawable):
-    """A family of equilibria or cycles over a parameter, in the order in which the curve was followed.
+    """Family of equilibria or cycles over a parameter, in the order in which the curve was followed.
 
     Attributes
     ----------
@@ -135,6 +145,12 @@ class Branch(Drawable):
         In the order of the arclength.
     ends : tuple of str
         Why the branch ends, at its beginning and at its end.
+
+    See Also
+    --------
+    udd.continuation : makes it.
+    udd.plot.branches : draw it.
+    udd.diagram : several branches with section points.
     """
 
     model: Model
@@ -182,7 +198,18 @@ class Branch(Drawable):
 
     @checked_arguments
     def solution(self, i: int) -> Equilibrium | PeriodicOrbit:
-        """The equilibrium or cycle of one point of the branch."""
+        """Return the equilibrium or cycle of one point of the branch.
+
+        Parameters
+        ----------
+        i : int
+            Number of the point, counted from 0.
+
+        Returns
+        -------
+        Equilibrium or PeriodicOrbit
+            At the value ``values[i]``.
+        """
         try:
             curve, place = self._places[operator.index(i)]
         except IndexError:
@@ -193,12 +220,34 @@ class Branch(Drawable):
 
     @checked_arguments
     def find(self, kind: str) -> list[BifurcationPoint]:
-        """The bifurcation points of one kind."""
+        """Return the bifurcation points of one kind.
+
+        Parameters
+        ----------
+        kind : str
+            A value of `BifurcationPoint.kind`, such as ``"fold"``.
+
+        Returns
+        -------
+        list of BifurcationPoint
+            In the order of the branch.
+        """
         return [point for point in self.points if point.kind == kind]
 
     @checked_arguments
     def at(self, value: float) -> list[Equilibrium | PeriodicOrbit]:
-        """The solutions at a value of the parameter, polished; more than one where the branch folds."""
+        """Return the solutions at a value of the parameter, polished by Newton steps.
+
+        Parameters
+        ----------
+        value : float
+            The value of the parameter.
+
+        Returns
+        -------
+        list of Equilibrium or PeriodicOrbit
+            More than one if the branch folds.
+        """
         solutions: list[Equilibrium | PeriodicOrbit] = []
         for i, (a, b) in enumerate(pairwise(self.values)):
             if not min(a, b) <= value <= max(a, b) or (value == b and i + 2 < len(self)):
@@ -215,7 +264,7 @@ class Branch(Drawable):
         return solutions
 
     def to_xarray(self) -> xr.Dataset:
-        """The branch as labelled arrays over ``place``: every state, the parameter, periods and multipliers.
+        """Return labelled arrays over ``place``: every state, the parameter, periods and multipliers.
 
         Returns
         -------
@@ -246,7 +295,13 @@ class Branch(Drawable):
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The branch as plain numbers, for JSON."""
+        """Return the branch as plain numbers, for JSON.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "parameter": self.parameter,
             "kind": self.kind,

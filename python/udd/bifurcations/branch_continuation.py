@@ -84,6 +84,12 @@ def continuation(
     ModelError
         A parameter or option that cannot be used; a point where no branch is born.
 
+    See Also
+    --------
+    udd.locus : bifurcations over a second parameter.
+    udd.diagram : branches with section points.
+    udd.plot.branches : draw the branch.
+
     Notes
     -----
     The curve is followed by its arclength (H. B. Keller, 1977): a step along the tangent, then Newton's
@@ -96,6 +102,10 @@ def continuation(
     accurate next to strong ones. No bifurcation is reported if rounding leaves their sign open, or if their
     product contradicts Liouville's formula. If an equilibrium meets a surface on which the law has a kink (a
     border collision), the branch lands on the surface and goes on with the other law's tangent.
+
+    References
+    ----------
+    H. B. Keller [26]. Bifurcations: Yu. A. Kuznetsov [24].
 
     Examples
     --------

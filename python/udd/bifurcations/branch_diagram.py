@@ -46,6 +46,11 @@ class Diagram(Drawable):
         The result of :func:`udd.bifurcation`, up and down: points, attractors, hysteresis.
     branches : tuple of Branch
         Equilibria first, then cycles; of mirror images one.
+
+    See Also
+    --------
+    udd.diagram : makes it.
+    udd.plot.diagram : draw it.
     """
 
     model: Model
@@ -69,7 +74,13 @@ class Diagram(Drawable):
         return intervals
 
     def as_dict(self) -> dict[str, Any]:
-        """Branches, points and hysteresis as plain numbers, for JSON."""
+        """Return branches, points and hysteresis as plain numbers, for JSON.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "model": repr(self.model),
             "parameter": self.parameter,
@@ -96,7 +107,7 @@ def diagram(
     max_period: float | None = None,
     **options: Any,
 ) -> Diagram:
-    """The bifurcation diagram with what lies behind it.
+    """Compute a bifurcation diagram: section points, branches and their bifurcations.
 
     Parameters
     ----------
@@ -124,6 +135,12 @@ def diagram(
     ------
     ModelError
         A parameter, value or option that cannot be used.
+
+    See Also
+    --------
+    udd.bifurcation : the section points alone.
+    udd.continuation : a single branch.
+    udd.plot.diagram : draw it.
 
     Notes
     -----

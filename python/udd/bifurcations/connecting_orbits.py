@@ -31,7 +31,7 @@ _STANDS = 1e-13  # Relative change below which the value has converged.
 
 @dataclass(frozen=True, eq=False)
 class Connection(Drawable):
-    """An orbit that takes for ever to leave an equilibrium and for ever to arrive.
+    """Orbit that leaves an equilibrium and arrives at an equilibrium, both in infinite time.
 
     Attributes
     ----------
@@ -52,6 +52,12 @@ class Connection(Drawable):
         The orbit, forward in time.
     nearest : float
         How near to the equilibrium its ends are, in typical sizes.
+
+    See Also
+    --------
+    udd.connection : finds it from a branch of cycles.
+    udd.connections : finds all of an interval.
+    udd.plot.cycle : draw it.
     """
 
     kind: str
@@ -89,7 +95,7 @@ class Connection(Drawable):
 
     @property
     def fold_ratio(self) -> float:
-        """By what the distance of a branch's folds from the value shrinks from fold to fold; NaN of saddles.
+        """Ratio of successive distances of a branch's folds from the value; NaN of saddles.
 
         They lie on both sides in turn: ``exp(-pi rho/omega)`` for the pair ``rho +- i omega``. This is
         Shil'nikov's limit for many folds; there is no bound of how far any one fold is off.
@@ -99,7 +105,7 @@ class Connection(Drawable):
 
     @property
     def fold_spacing(self) -> float:
-        """By what the period grows from fold to fold in that limit: ``pi/omega``; NaN of saddles."""
+        """Limit of the difference of periods of successive folds, ``pi/omega``; NaN of saddles."""
         return float(np.pi / self.leading.imag) if self.leading.imag else float("nan")
 
     def __repr__(self) -> str:
@@ -128,6 +134,11 @@ def connection(branch: Branch) -> Connection:
     ModelError
         A branch that tends to no connection.
 
+    See Also
+    --------
+    udd.connections : all connections of an interval.
+    udd.plot.cycle : draw the orbit.
+
     Notes
     -----
     The equilibrium is the one to which the branch's longest cycle comes nearest. That cycle, cut there, is
@@ -135,6 +146,10 @@ def connection(branch: Branch) -> Connection:
     decaying ones (W.-J. Beyn, IMA Journal of Numerical Analysis 10 (1990) 379). Multiple shooting solves for
     the orbit, the equilibrium and the parameter. The orbit is then prolonged at both ends until the value
     stands.
+
+    References
+    ----------
+    W.-J. Beyn [34].
 
     Examples
     --------

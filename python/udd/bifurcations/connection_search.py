@@ -80,7 +80,13 @@ _Found = tuple[int, Connection]  # when it came near the equilibrium at its end
 
 
 class Connections(FoundList[Connection]):
-    """Connections in the order of their values."""
+    """Connections in the order of their values.
+
+    See Also
+    --------
+    udd.connections : makes them.
+    udd.plot.cycle : draw a connection.
+    """
 
 
 @renamed(longest="t_max")
@@ -93,7 +99,7 @@ def connections(
     n: int = 300,
     t_max: float | None = None,
 ) -> Connections:
-    """The homoclinic and heteroclinic orbits of an interval of a parameter.
+    """Find the homoclinic and heteroclinic orbits of an interval of a parameter.
 
     Parameters
     ----------
@@ -118,6 +124,11 @@ def connections(
     ModelError
         A parameter or option that cannot be used, or no equilibrium with one direction on its own.
 
+    See Also
+    --------
+    udd.connection : the connection at the end of a branch.
+    udd.plot.cycle : draw an orbit.
+
     Notes
     -----
     If one eigenvalue of an equilibrium is alone on its side of the imaginary axis, the manifold along it is a
@@ -127,6 +138,10 @@ def connections(
     connection with a slow spiral there are infinitely many others, which take longer. Missed are those
     between neighbouring values at which the curves take one course, and a few that lie nearer to each other
     than 1e-7.
+
+    References
+    ----------
+    W.-J. Beyn [34].
 
     Examples
     --------

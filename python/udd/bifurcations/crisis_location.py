@@ -47,7 +47,7 @@ _ASIDE = 1e-5  # Relative distance from the crisis at which the attractor is exa
 
 @dataclass(frozen=True, eq=False)
 class Crisis(Drawable):
-    """A tangency at which a chaotic attractor meets a saddle cycle.
+    """Tangency at which a chaotic attractor meets a saddle cycle.
 
     Attributes
     ----------
@@ -69,6 +69,11 @@ class Crisis(Drawable):
         stable manifold, so there is no earlier tangency among them.
     cycle : PeriodicOrbit
         The saddle cycle at the value.
+
+    See Also
+    --------
+    udd.crises : finds it.
+    udd.plot.cycle : draw the saddle cycle.
     """
 
     kind: str
@@ -80,7 +85,13 @@ class Crisis(Drawable):
     cycle: PeriodicOrbit
 
     def as_dict(self) -> dict[str, Any]:
-        """The crisis as plain numbers, for JSON."""
+        """Return the crisis as plain numbers, for JSON.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "kind": self.kind,
             "parameter": self.parameter,
@@ -123,6 +134,12 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     ModelError
         No branch of cycles over a parameter of a model that is not forced.
 
+    See Also
+    --------
+    udd.lifetimes : mean time of a transient.
+    udd.cycle_connections : connections with an equilibrium.
+    udd.plot.cycle : draw the saddle cycle.
+
     Notes
     -----
     One side of the saddle cycle's unstable manifold goes to the attractor and is folded there. As long as it
@@ -133,6 +150,10 @@ def crises(branch: Branch, *, n: int = 100, depth: int = 40) -> list[Crisis]:
     move the value, and there is no bound of that. Two crises between neighbouring points of the branch are
     missed, and so are those at cycles with multipliers below -1 that are not symmetric (their sides change
     every round).
+
+    References
+    ----------
+    C. Grebogi, E. Ott and J. A. Yorke [36, 37].
 
     Examples
     --------

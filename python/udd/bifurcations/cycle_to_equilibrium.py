@@ -36,7 +36,7 @@ _ONTO = 1e-4  # Largest distance from the cycle in the end, in typical sizes.
 
 @dataclass(frozen=True, eq=False)
 class CycleConnection(Drawable):
-    """An orbit between an equilibrium and a saddle cycle.
+    """Orbit between an equilibrium and a saddle cycle.
 
     Attributes
     ----------
@@ -50,6 +50,11 @@ class CycleConnection(Drawable):
     equilibrium : Equilibrium
     cycle : PeriodicOrbit
         Both at the value.
+
+    See Also
+    --------
+    udd.cycle_connections : finds it.
+    udd.plot.cycle : draw it.
     """
 
     kind: str
@@ -86,6 +91,12 @@ def cycle_connections(branch: Branch, equilibrium: Equilibrium) -> list[CycleCon
     ------
     ModelError
         No branch of cycles over a parameter of the model, or an equilibrium with no direction on its own.
+
+    See Also
+    --------
+    udd.connections : between equilibria.
+    udd.crises : tangencies of saddle cycles.
+    udd.plot.cycle : draw the orbit.
 
     Notes
     -----

@@ -29,7 +29,7 @@ _KNOWN = 3  # doublings, whose spacings say where the next one is
 
 @dataclass(frozen=True, eq=False)
 class Cascade(Drawable):
-    """Period doublings that follow one another.
+    """Successive period doublings.
 
     Attributes
     ----------
@@ -38,6 +38,11 @@ class Cascade(Drawable):
         The doublings.
     branches : tuple of Branch
         The cycles that lead to each of them.
+
+    See Also
+    --------
+    udd.cascade : makes it.
+    udd.plot.cascade : draw it.
     """
 
     parameter: str
@@ -122,6 +127,12 @@ def cascade(
     ------
     ModelError
         Where no doubling follows: the message says which was the last.
+
+    See Also
+    --------
+    udd.continuation : follows a single branch.
+    udd.plot.cascade : draw it.
+    udd.plot.branches : draw its branches.
 
     Notes
     -----

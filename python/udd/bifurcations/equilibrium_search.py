@@ -47,7 +47,7 @@ class Equilibria(FoundList[Equilibrium]):
 @renamed(starts="initial_states")
 @checked_arguments
 def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: int = 128) -> Equilibria:
-    """The equilibria of a model.
+    """Find the equilibria of a model.
 
     Parameters
     ----------
@@ -70,6 +70,11 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     ------
     ModelError
         A model whose rates depend on time.
+
+    See Also
+    --------
+    udd.continuation : follows one over a parameter.
+    udd.plot.eigenvalues : draw the eigenvalues.
 
     Notes
     -----

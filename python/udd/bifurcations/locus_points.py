@@ -40,7 +40,7 @@ ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("1:1 resonance", "1:2 r
 
 @dataclass(frozen=True, eq=False)
 class LocusPoint:
-    """A point of a curve of bifurcations at which two conditions hold at a time (of codimension two).
+    """Point of codimension two: a point of a curve of bifurcations with a second condition.
 
     Attributes
     ----------
@@ -55,6 +55,15 @@ class LocusPoint:
         Those of the normal form, with bounds; empty for cycles. A cusp has "c", a Bogdanov-Takens point "a"
         and "b". A Bautin point has "l2" (the second Lyapunov coefficient), a zero-Hopf point "s" and
         "theta".
+
+    See Also
+    --------
+    udd.locus : finds it on the curve.
+    udd.plot.locus : draw the curve with its points.
+
+    References
+    ----------
+    Yu. A. Kuznetsov [24, 25].
     """
 
     kind: str

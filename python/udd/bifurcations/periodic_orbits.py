@@ -55,7 +55,7 @@ def periodic_orbit(
     settle: float | None = None,
     max_period: float | None = None,
 ) -> PeriodicOrbit:
-    """A cycle of a model, with its Floquet multipliers and its symmetry.
+    """Find a cycle of a model, with its Floquet multipliers and its symmetry.
 
     Parameters
     ----------
@@ -89,6 +89,12 @@ def periodic_orbit(
         A model whose rates depend on time while no period is given or do not repeat after it, a guess of the
         wrong shape, or one from which Newton's method finds no cycle.
 
+    See Also
+    --------
+    udd.continuation : follows it over a parameter.
+    udd.plot.cycle : draw it.
+    udd.plot.eigenvalues : draw its multipliers.
+
     Notes
     -----
     The orbit is cut into pieces. The Taylor method follows them to the tolerance 1e-13 (Dormand & Prince's
@@ -100,6 +106,10 @@ def periodic_orbit(
 
     A cycle of a forced model lasts as long as the forcing says; its multipliers are those of the stroboscopic
     map, one for each component of the state.
+
+    References
+    ----------
+    Multiple shooting: H. G. Bock [48]. Multipliers: A. Bojanczyk et al. [32].
 
     Examples
     --------

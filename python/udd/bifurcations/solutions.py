@@ -60,7 +60,7 @@ def kind_of_rest(eigenvalues: Complex) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium(Drawable):
-    """A state at which nothing changes but angles that nothing depends on.
+    """State at which nothing changes but angles that nothing depends on.
 
     Attributes
     ----------
@@ -80,6 +80,12 @@ class Equilibrium(Drawable):
         If the pair crosses the axis, the Hopf bifurcation is supercritical if the coefficient is negative.
     isolated : bool
         True if no other equilibria lie arbitrarily near.
+
+    See Also
+    --------
+    udd.equilibria : finds them.
+    udd.continuation : follows one over a parameter.
+    udd.plot.eigenvalues : draw its eigenvalues.
     """
 
     model: Model
@@ -105,7 +111,7 @@ class Equilibrium(Drawable):
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit(Drawable):
-    """A cycle of a model.
+    """Cycle of a model.
 
     Attributes
     ----------
@@ -123,6 +129,13 @@ class PeriodicOrbit(Drawable):
         States on it at equal distances of time, from `state` on; of a symmetric one over half the period.
     residual : float
         The largest gap between the pieces of orbits that it was found of, in typical sizes.
+
+    See Also
+    --------
+    udd.periodic_orbit : finds it.
+    udd.continuation : follows it over a parameter.
+    udd.plot.cycle : draw it.
+    udd.plot.eigenvalues : draw its multipliers.
     """
 
     model: Model
@@ -164,7 +177,20 @@ class PeriodicOrbit(Drawable):
         return curve.period_error(u)
 
     def trajectory(self, n: int = 400, **options: Any) -> Trajectory:
-        """The cycle as a run over one period, at `n` + 1 times; options are those of :func:`udd.simulate`."""
+        """Run the cycle over one period.
+
+        Parameters
+        ----------
+        n : int
+            The run has `n` + 1 times.
+        **options
+            As for :func:`udd.simulate`.
+
+        Returns
+        -------
+        Trajectory
+            From the state of the cycle.
+        """
         from udd.simulation.trajectory import simulate
 
         n = whole("n", n, 1)

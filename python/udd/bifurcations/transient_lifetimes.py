@@ -29,7 +29,7 @@ _ROUND = 800  # states that show a cycle
 
 @dataclass(frozen=True, eq=False)
 class Lifetimes(Drawable):
-    """How long motions last before they settle.
+    """Times of motions before they settle.
 
     Attributes
     ----------
@@ -43,6 +43,11 @@ class Lifetimes(Drawable):
         The mean lifetime, if the motion forgets how old it is: infinite where none settled.
     standard_error : float
         That of the mean: the mean divided by the square root of the number that settled.
+
+    See Also
+    --------
+    udd.lifetimes : measures them.
+    udd.plot.lifetimes : draw them.
     """
 
     time: Floats
@@ -82,7 +87,7 @@ def lifetimes(
     near: float = 0.02,
     threads: int | None = None,
 ) -> Lifetimes:
-    """How long motions last before they settle on known attractors.
+    """Measure the times of motions before they settle on known attractors.
 
     Parameters
     ----------
@@ -111,6 +116,12 @@ def lifetimes(
     ------
     ModelError
         Attractors that are not stable, or options that cannot be used.
+
+    See Also
+    --------
+    udd.crises : the value at which a transient begins.
+    udd.basins : which start ends where.
+    udd.plot.lifetimes : draw them.
 
     Examples
     --------

@@ -64,6 +64,11 @@ class AddedEffect(OneLine):
         Its title as a candidate, with the shape and the frequency of the trial.
     by_record : list of RecordAnswer
         The answer of each of several records that were fitted together.
+
+    See Also
+    --------
+    udd.discover : finds it.
+    udd.plot.curve : draw a located curve.
     """
 
     effect: Effect
@@ -93,12 +98,27 @@ class AddedEffect(OneLine):
         """Return True for a curve over time alone, which may be the drift of a sensor's zero.
 
         A disk's is none, because a camera sees it.
+
+        Parameters
+        ----------
+        model : Model
+            The fitted model.
+
+        Returns
+        -------
+        bool
         """
         over = [] if self.curve is None else [c.name for c in self.curve.coordinates]
         return over == ["t"] and not model.profile.sensor.sees_marks
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the effect as JSON-ready values."""
+        """Return the effect as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "name": self.effect.name,
             "momentum": self.effect.momentum,
@@ -405,7 +425,13 @@ class Discovery(Drawable):
         return self.hints[0] if self.hints else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the discovery as JSON-ready values."""
+        """Return the discovery as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "verdict": self.verdict,
             "stopped": self.stopped,
@@ -426,7 +452,20 @@ class Discovery(Drawable):
         }
 
     def report(self, path: str | os.PathLike[str], **details: Any) -> Report:
-        """Write a page for readers, with pictures first, in one file. See :func:`udd.report.write`."""
+        """Write a page for readers, with pictures first, in one file.
+
+        Parameters
+        ----------
+        path : path
+            HTML file to write.
+        **details
+            As for :func:`udd.report.write`.
+
+        Returns
+        -------
+        Report
+            Parts of the page.
+        """
         from udd.report import write
 
         return write(self, path, **details)

@@ -54,6 +54,10 @@ class Pruned:
         Those of `removed` that the data do not determine together with the terms named before them: on the
         orbit they are linear combinations of these, and could replace them. A constant of the motion causes
         such terms.
+
+    See Also
+    --------
+    udd.prune : makes it.
     """
 
     fit: Fit
@@ -70,7 +74,13 @@ class Pruned:
         return self.fit.model
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as JSON-ready values."""
+        """Return the result as JSON-ready values.
+
+        Returns
+        -------
+        dict of str
+            Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
+        """
         return {
             "kept": {name: {"rise": self.rise[name]} for name in self.kept},
             "removed": self.removed,
