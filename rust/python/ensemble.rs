@@ -76,7 +76,7 @@ fn ensemble<'py>(
     }
     let values = batch.rows(&model)?;
     let watched = batch.jobs();
-    let (table, dimension, signal) = with_wide_model!(starts: &model, |family, _values| {
+    let (table, dimension, signal) = with_wide_model!(packets: &model, |family, _values| {
         let starts = jobs::starts(&batch.starts, family.idle())?;
         jobs::agree(values.len(), starts.len())?;
         let dimension = starts[0].len();

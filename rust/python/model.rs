@@ -60,19 +60,14 @@ pub(crate) use with_model;
 /// The same for work on packets and tangents, which takes long to compile: not for friction by bristles, and of
 /// [filled](AnyModel::filled) models.
 ///
-/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets`, and of `starts`,
-/// the DLE has its own single runs; `starts` are for up to 12 states.
+/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
+/// own single runs.
 macro_rules! with_wide_model {
     (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
         $crate::python::model::with_wide_model!(@ $model, $values, $body,
-            Two($family) Three($family) Four($family) Six($family))
+            Two($family) Three($family) Four($family) Six($family) Twelve($family))
     };
     (packets: $model:expr, |$family:ident, $values:ident| $body:expr) => {
-        $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family)
-            Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
-            Four($family) Six($family))
-    };
-    (starts: $model:expr, |$family:ident, $values:ident| $body:expr) => {
         $crate::python::model::with_wide_model!(@ $model, $values, $body, Two($family)
             Three($crate::model::Either::First($family)) Three($crate::model::Either::Second($family))
             Four($family) Six($family) Twelve($family))
@@ -234,14 +229,8 @@ impl AnyModel {
         })
     }
 
-    /// Why it is not for what was asked.
+    /// The reason why a model with bristles is refused.
     pub fn too_much(&self) -> PyErr {
-        if self.is_own() {
-            let states = self.states().len();
-            return ModelError::new_err(format!(
-                "sections, exponents, covariant vectors and cycles are for models with at most 6 states, not {states}"
-            ));
-        }
         ModelError::new_err("friction with the treatment lugre is for udd.simulate; here take set-valued")
     }
 

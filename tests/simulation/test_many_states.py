@@ -108,11 +108,45 @@ def test_equilibria_of_many_states() -> None:
     )
 
 
-def test_what_is_not_compiled_for_many_states_says_so() -> None:
-    said = "are for models with at most 6 states, not 8"
-    with pytest.raises(ModelError, match=said):
-        udd.lyapunov(ring(8), state0=np.arange(8.0))
-    with pytest.raises(ModelError, match=said):
-        udd.lyapunov_spectrum(ring(8), state0=np.arange(8.0))
-    with pytest.raises(ModelError, match=said):
-        udd.poincare(ring(8), "x0 - 2", 3, state0=np.arange(8.0))
+@pytest.mark.parametrize("n", [7, 12])
+def test_exponents_of_many_states_add_up_to_the_divergence(n: int) -> None:
+    spectrum = udd.lyapunov_spectrum(ring(n), t=20.0, transient=5.0, tol=10.0, state0=np.arange(float(n)))
+    assert spectrum.exponents.shape == (n,)
+    assert spectrum.exponents.sum() == pytest.approx(-n, abs=1e-6)
+    drives, options = np.linspace(7.0, 9.0, 5), {"t": 20.0, "tol": 10.0, "state0": np.arange(float(n))}
+    many = udd.lyapunov(ring(n), parameters={"F": drives}, **options)
+    alone = [udd.lyapunov(ring(n).replace(F=drive), **options) for drive in drives]
+    # One in each lane of a packet, with the same bits.
+    np.testing.assert_array_equal(many, alone)
+
+
+def test_sections_of_many_states_agree_with_scipy() -> None:
+    n = 8
+    found = udd.poincare(ring(n), "x0 - 2", 4, state0=np.arange(8.0), direction="up", transient=0)
+
+    def surface(_t: float, x: NDArray[np.float64]) -> float:
+        return float(x[0] - 2.0)
+
+    surface.direction = 1.0  # type: ignore[attr-defined]
+    run = solve_ivp(
+        lambda _t, x: ring_rates(x),
+        (0.0, 6.0),
+        np.arange(8.0),
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-13,
+        events=surface,
+    )
+    np.testing.assert_allclose(found.t[:3], run.t_events[0][:3], atol=1e-8)
+    np.testing.assert_allclose(found.state[:3], run.y_events[0][:3], atol=1e-7)
+
+
+def test_a_cycle_of_eight_states_has_the_multipliers_of_its_divergence() -> None:
+    """Beyond its Hopf bifurcation the ring has a travelling wave."""
+    model = ring(8).replace(F=1.5)
+    wave = udd.simulate(model, [0.0, 200.0], 1.5 + 0.1 * np.cos(np.arange(8.0))).state[-1]
+    cycle = udd.periodic_orbit(model, wave)
+    turn = udd.simulate(model, [0.0, cycle.period], cycle.state, rtol=1e-12, atol=1e-13).state[-1]
+    np.testing.assert_allclose(turn, cycle.state, atol=1e-8)
+    assert cycle.multipliers.shape == (7,)  # without the trivial one
+    assert np.log(np.abs(cycle.multipliers)).sum() == pytest.approx(-8.0 * cycle.period, rel=1e-3)
