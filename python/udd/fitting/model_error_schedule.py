@@ -24,8 +24,8 @@ LEAP = 3  # levels that a right model can skip
 ROUGH = 10.0
 #: Decrease in evidence (nats) that is acceptable when the model error is reduced.
 LESS = 3.0
-#: Model errors below the last level, in units of it, and the change of a standard error that counts as none.
-_NEGLIGIBLE, _UNCHANGED = (0.1, 1e-2, 1e-3), 0.005
+#: Model error in units of the last level's: at a tenth of it the standard errors change by less than 0.3 %.
+_NEGLIGIBLE = 1e-2
 _LITTLE = 3  # Further steps for a fit that may be close to its minimum.
 _FAR_OFF = 10.0  # Value of chi2 per degree of freedom of a model that is far from explaining the data.
 _LOOSE = 0.3  # Leverage above which misfits do not show the noise.
@@ -218,20 +218,13 @@ def with_negligible_model_error(fitted: Fit) -> Fit:
     # Without this the standard errors of a chaotic disk are 1.5 times too large.
     if not (fitted.converged and _is_last(fitted.problem)):
         return fitted
-    last = fitted.problem.diffusion
-    result, limit = fitted, None
-    for factor in _NEGLIGIBLE:
-        diffusion = tuple(factor * q for q in last)
-        problem = fitted.problem.with_model_error(diffusion)
-        try:
-            tighter = solve(fitted.measurements, problem, result.point, FEW)
-        except FitError:
-            break
-        if not _stands(tighter, result):
-            break
-        before, result, limit = result, tighter, diffusion
-        if all(abs(result.errors[name] / error - 1.0) < _UNCHANGED for name, error in before.errors.items()):
-            break
+    limit = tuple(_NEGLIGIBLE * q for q in fitted.problem.diffusion)
+    try:
+        result = solve(fitted.measurements, fitted.problem.with_model_error(limit), fitted.point, FEW)
+    except FitError:
+        return fitted
+    if not _stands(result, fitted):
+        return fitted
     return replace(
         fitted,
         models=result.models,
