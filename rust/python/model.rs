@@ -60,8 +60,8 @@ pub(crate) use with_model;
 /// The same for work on packets and tangents, which takes long to compile: not for friction by bristles, and of
 /// [filled](AnyModel::filled) models.
 ///
-/// `tangents` are for single numbers, and models of as many states share what is compiled. Of `packets` the DLE has its
-/// own single runs.
+/// `tangents` are for single numbers, and models of as many states share what is compiled. Among `packets` single runs of
+/// the DLE are compiled separately.
 macro_rules! with_wide_model {
     (tangents: $model:expr, |$family:ident, $values:ident| $body:expr) => {
         $crate::python::model::with_wide_model!(@ $model, $values, $body,
