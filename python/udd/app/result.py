@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from markupsafe import Markup
+
 from udd.errors import ModelError
 from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
@@ -20,19 +22,20 @@ from .spec import model_of
 def of(discovery: Any) -> dict[str, Any]:
     """Return the top of the result: the verdict and its numbers."""
     numbers = wording.headline(discovery)
+    origin = [str(text)] if (text := discovery.measurement.meta.get("origin")) else []
     return {
         "verdict": discovery.verdict,
         "sentence": wording.verdict(discovery),
         "effects": [
             {
                 "title": e.title,
-                "equation": text_of(wording.pretty(e.equation)),
+                "equation": _symbols(e.equation),
                 "values": _values(e),
                 "p": e.p,
             }
             for e in discovery.effects
         ],
-        "limits": [text_of(text) for text in wording.short_limits(discovery)],
+        "limits": [*origin, *(_symbols(text) for text in wording.short_limits(discovery))],
         "constants": _constants(discovery),
         "of_spread": discovery.error_before.unit == "spread",
         "no_more_than_noise": [bool(numbers.before_note), bool(numbers.after_note)],
@@ -49,6 +52,11 @@ def of(discovery: Any) -> dict[str, Any]:
         ],
         "explore": _explore(discovery),
     }
+
+
+def _symbols(text: str) -> str:
+    """Return a formula or a sentence with Greek letters and minus signs, and indices as in W_c."""
+    return text_of(Markup(wording.pretty(text).replace("<sub>", "_")))
 
 
 def _constants(discovery: Any) -> list[dict[str, str]]:

@@ -273,7 +273,7 @@ export class Loop {
     }));
     const span = found.of_spread ? `${found.span}, ${t("loop_of_spread")}` : found.span;
     const note = (k) => (found.no_more_than_noise[k] ? `${span}; ${t("loop_no_more")}` : span);
-    const figures = [["before", t("loop_before"), found.before, note(0)]];
+    const figures = [[found.no_more_than_noise[0] ? "" : "before", t("loop_before"), found.before, note(0)]];
     if (found.after) {
       figures.push(["after", t("loop_after"), found.after, note(1)]);
       figures.push(["", t("loop_ratio"), found.ratio, t("loop_interval", { interval: found.interval })]);
