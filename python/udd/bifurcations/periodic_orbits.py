@@ -109,7 +109,7 @@ def periodic_orbit(
 
     References
     ----------
-    Multiple shooting: H. G. Bock [48]. Multipliers: A. Bojanczyk et al. [32].
+    Multiple shooting: S. J. Wright [27]. Multipliers: A. Bojanczyk et al. [32].
 
     Examples
     --------
