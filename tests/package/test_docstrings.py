@@ -23,8 +23,6 @@ PACKAGE = ROOT / "python" / "udd"
 MODULES = ("udd", *(f"udd.{name}" for name in udd.__all__ if inspect.ismodule(getattr(udd, name))))
 FUNCTIONS = [name for name in udd.__all__ if inspect.isfunction(getattr(udd, name))]
 CLASSES = [name for name in udd.__all__ if inspect.isclass(getattr(udd, name))]
-#: Packages whose internal docstrings are not rewritten yet. A package leaves this list and never enters it.
-PENDING = {"bifurcations"}
 
 # numpydoc's own codes: a docstring at all, its sections in order, every parameter described, none that
 # does not exist, what is returned, an example.
@@ -173,7 +171,6 @@ def test_first_lines_of_all_docstrings_are_phrases() -> None:
     faults = [
         f"{path.relative_to(PACKAGE)}:{fault}"
         for path in sorted(PACKAGE.rglob("*.py"))
-        if path.relative_to(PACKAGE).parts[0] not in PENDING
         for fault in first_line_faults(path.read_text(encoding="utf-8"))
     ]
     assert faults == []

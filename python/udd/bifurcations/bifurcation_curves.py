@@ -264,7 +264,7 @@ def _place(surface: SolutionSurface, kind: str, point: SurfacePoint) -> LocusPla
 
 
 def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> list[LocusPoint]:
-    """The Bautin point near a small cycle at its fold, along the curve of Hopf points."""
+    """Find the Bautin point near a small cycle at its fold, along the curve of Hopf points."""
     curve = point.curve
     hopf = hopf_end(curve, point.v[:-1]) if isinstance(curve, PeriodicOrbitCurve) else None
     if hopf is None or hopf._curve is None or hopf._place is None:
@@ -279,7 +279,7 @@ def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> 
 
 @dataclass(frozen=True)
 class _Way:
-    """How a curve of bifurcations is followed on the surface of solutions."""
+    """Settings for following a curve of bifurcations on the surface of solutions."""
 
     surface: SolutionSurface
     kind: str
@@ -364,7 +364,7 @@ class _Way:
                 trace.places.append(_place(surface, self.kind, last[2]))
 
     def _outside(self, point: SurfacePoint) -> list[tuple[int, float]]:
-        """The parameters that have left their bounds, and which bounds."""
+        """Return the parameters that have left their bounds, and these bounds."""
         pairs = zip(self.surface.values(point).tolist(), self.box.tolist(), strict=True)
         return [
             (k, low if value < low else high)

@@ -49,7 +49,7 @@ _SURE = 2.0  # Ratio of the bound to the largest scatter.
 
 
 def changes(before: TestFunctions, after: TestFunctions) -> list[str]:
-    """Which functions change their signs."""
+    """Return a mask of the functions that change their signs."""
     names = []
     for name in ("fold", "unit_multiplier", "period_doubling", "complex_pair", "collision"):
         a, b = getattr(before, name), getattr(after, name)
@@ -122,7 +122,7 @@ def turning(
 def pitchfork_at(
     curve: AnyCurve, a: CurvePoint, step: float, sigma: float
 ) -> tuple[float, CurvePoint, float]:
-    """The pitchfork near the distance `sigma` from `a`, where the parameter turns along its side branch.
+    """Find the pitchfork near the distance `sigma` from `a`, where the parameter turns along its side branch.
 
     The equations are singular there. The curve is smooth, so that polynomials through its points about the
     pitchfork, none of them too near, give it to rounding.
@@ -158,7 +158,7 @@ def pitchfork_at(
 
 
 def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, Floats, Floats]:
-    """The distance at which the parameter turns, the point and its slope, by polynomials of this degree.
+    """Return the distance at which the parameter turns, the point and its slope, by polynomials.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, 
 
 
 def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
-    """The zero of one of the functions between `a` and the point at the distance `step` after it.
+    """Locate the zero of one of the functions between `a` and the point at the distance `step` after it.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[floa
 
 
 def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> CurvePoint:
-    """The point of the curve at a distance from `a`.
+    """Return the point of the curve at a distance from `a`.
 
     Next to a branch point the equations leave a second direction free, in which rounding alone would move
     Newton's method: there it takes the shortest steps.

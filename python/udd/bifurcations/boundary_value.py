@@ -143,24 +143,24 @@ class ConnectingCurve:
         return np.concatenate([(nodes / size * weight).ravel(), (rests / size).ravel(), last])
 
     def nodes(self, u: Floats) -> Floats:
-        """The nodes (m + 1, r)."""
+        """Return the nodes (m + 1, r)."""
         scaled = u[: -2 - self.ends * self.flow.dim].reshape(-1, self.flow.dim)
         nodes: Floats = scaled * self.flow.size / self.weight
         return nodes
 
     def rests(self, u: Floats) -> Floats:
-        """The equilibria (1 or 2, r)."""
+        """Return the equilibria (1 or 2, r)."""
         scaled = u[-2 - self.ends * self.flow.dim : -2].reshape(self.ends, -1)
         rests: Floats = scaled * self.flow.size
         return rests
 
     def parameters(self, u: Floats) -> Floats:
-        """The values (2,) of the free parameters."""
+        """Return the values (2,) of the free parameters."""
         pair: Floats = u[-2:] * self.scales
         return pair
 
     def values_at(self, u: Floats) -> Floats:
-        """All parameters."""
+        """Return all parameters."""
         values = self.values.copy()
         for index, value in zip(self.free, self.parameters(u).tolist(), strict=True):
             if index != HELD:
@@ -168,7 +168,7 @@ class ConnectingCurve:
         return values
 
     def anchored(self, u: Floats) -> ConnectingCurve:
-        """The curve with its phase and its planes fixed here."""
+        """Return the curve with its phase and its planes fixed here."""
         flow, values, nodes, rests = self.flow, self.values_at(u), self.nodes(u), self.rests(u)
         middle = nodes[len(nodes) // 2]
         rate = flow.rates(values, middle) / flow.size
@@ -265,16 +265,16 @@ class ConnectingCurve:
         return curve, u
 
     def _gaps(self, u: Floats) -> tuple[Floats, Floats]:
-        """How far the nodes are from the first equilibrium, and their images from the last; (m + 1, r)."""
+        """Return the gaps of nodes to the first and of images to the last equilibrium, (m + 1, r)."""
         nodes, rests = self.nodes(u), self.rests(u)
         return (nodes - rests[0]) / self.flow.size, (self.mirror * nodes - rests[-1]) / self.flow.size
 
     def extent(self, u: Floats) -> float:
-        """How far the orbit leaves its first equilibrium, in typical sizes."""
+        """Return the largest distance of the orbit from its first equilibrium, in typical sizes."""
         return float(np.linalg.norm(self._gaps(u)[0], axis=1).max())
 
     def nearest(self, u: Floats) -> float:
-        """How near to the equilibria the ends are, the further one, in typical sizes."""
+        """Return the larger distance of the two ends from their equilibria, in typical sizes."""
         first, last = self._gaps(u)
         return max(float(np.linalg.norm(first[0])), float(np.linalg.norm(last[-1])))
 
@@ -319,6 +319,6 @@ class ConnectingCurve:
 
 
 def _eigenvalues(flow: FlowMap, values: Floats, rest: Floats) -> np.ndarray:
-    """The eigenvalues (r,) of an equilibrium, largest real part first."""
+    """Return the eigenvalues (r,) of an equilibrium, largest real part first."""
     numbers = np.linalg.eigvals(expansion(flow, values, rest).by_state).astype(complex)
     return numbers[np.argsort(-numbers.real, kind="stable")]

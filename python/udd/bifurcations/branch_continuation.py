@@ -180,12 +180,12 @@ def bounds_of(bounds: Sequence[float]) -> tuple[float, float]:
 
 
 def unit_of(value: float, low: float, high: float) -> float:
-    """The unit in which a parameter counts: a fifth of the way between its bounds, else its own size."""
+    """Return the unit of a parameter: a fifth of the way between its bounds, else its own size."""
     return (high - low) / 5.0 if np.isfinite(high - low) else abs(value) or 1.0
 
 
 def in_unit_of(point: BifurcationPoint, low: float, high: float) -> BifurcationPoint:
-    """The point with its parameter in the unit of these bounds; as it is if one of them is infinite."""
+    """Return the point with its parameter in the unit of these bounds, unless they are infinite."""
     curve, place = point._curve, point._place
     if curve is None or place is None or isinstance(curve, FamilyCurve) or not np.isfinite(high - low):
         return point
@@ -210,7 +210,7 @@ def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[
 def _at(
     start: Equilibrium | PeriodicOrbit, parameter: str, low: float, high: float
 ) -> tuple[AnyCurve, CurvePoint]:
-    """The curve through a solution, and the place there."""
+    """Return the curve through a solution, and the place there."""
     solved = start._solved if isinstance(start, PeriodicOrbit) else None
     forcing = None if solved is None else solved[0].flow.forcing
     flow: FlowMap = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
@@ -255,7 +255,7 @@ def _at(
 
 
 def branch_from(ways: list[BranchTrace], model: Model, parameter: str, begin: str) -> Branch:
-    """The branch made of one way, or of two that begin at the same place, the first of them turned round."""
+    """Make a branch of one way, or of two that begin at the same place, the first of them reversed."""
     if len(ways) == 2:
         back, on = ways
         length = back.places[-1][3]

@@ -208,7 +208,7 @@ def descendants(
 
 
 def _seeds(model: Model, parameter: str, scan: xr.Dataset) -> list[tuple[PeriodicOrbit, float]]:
-    """A cycle of each periodic attractor, from the middle of its stretch."""
+    """Return a cycle of each periodic attractor, from the middle of its stretch."""
     kinds = np.stack([scan[name].to_numpy() for name in ("attractor", "period", "symmetric")], axis=-1)
     periodic = (kinds[..., 0] > 0) & (kinds[..., 1] > 0)
     seeds = []

@@ -23,7 +23,7 @@ _SHORTEST = 1e-4  # Shortest step along the other branch.
 
 
 def vanishing_part(curve: AnyCurve, a: Floats, b: Floats) -> float | None:
-    """The part of the step from `a` to `b` after which the orbit has no size; None if it keeps its shape.
+    """Return the part of the step from `a` to `b` after which the orbit has no size; None if it keeps one.
 
     Beyond a Hopf point the branch returns on the mirrored amplitude: the same cycles, half a period later.
     """
@@ -36,7 +36,7 @@ def vanishing_part(curve: AnyCurve, a: Floats, b: Floats) -> float | None:
 
 
 def size_of(curve: PeriodicOrbitCurve, u: Floats) -> float:
-    """The root mean square of an orbit's distance from its centre, in typical sizes."""
+    """Return the root mean square of an orbit's distance from its centre, in typical sizes."""
     return float(np.linalg.norm(_shape(curve, u))) / float(np.sqrt(curve.pieces))
 
 
@@ -47,7 +47,7 @@ def _shape(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
 
 
 def hopf_end(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
-    """The Hopf bifurcation from which a small cycle comes, as the branch of equilibria has it."""
+    """Return the Hopf bifurcation from which a small cycle comes, as the branch of equilibria has it."""
     flow, size, period = curve.flow, size_of(curve, u), curve.period(u)
     rest = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
     centre = curve.around(u).mean(axis=0)
@@ -61,7 +61,7 @@ def hopf_end(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
 
 
 def origin_of(curve: PeriodicOrbitCurve, u: Floats, step: float) -> BifurcationPoint | None:
-    """The doubling or the symmetry breaking from which a cycle comes whose halves are nearly the same."""
+    """Return the doubling or symmetry breaking of the cycle whose halves are nearly the same."""
     try:
         kind, half, nodes = half_of(curve, u)
     except (CorrectorFailed, IntegrationError):
@@ -101,7 +101,7 @@ def _numbers(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
 
 
 def _distance(first: PeriodicOrbitCurve, u: Floats, second: PeriodicOrbitCurve, v: Floats) -> float:
-    """The largest distance of one orbit's nodes from the polygon of the other orbit, in typical sizes."""
+    """Return the largest distance of an orbit's nodes from the polygon of the other, in typical sizes."""
     from .orbit_geometry import orbit_states
 
     flow = first.flow

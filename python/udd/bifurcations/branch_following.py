@@ -48,7 +48,7 @@ CLOSED = "the branch is closed"
 
 @dataclass(frozen=True)
 class ContinuationLimits:
-    """How far a branch is followed.
+    """Limits of a branch.
 
     `step` and `longest` are arclengths in scaled unknowns; `until` returns True for the bifurcation point
     that ends the branch.
@@ -266,7 +266,7 @@ def _connection(way: BranchTrace) -> float | None:
 
 
 def _once(points: list[BifurcationPoint]) -> list[BifurcationPoint]:
-    """The points of a closed branch; those that come again on its last step once."""
+    """Return the points of a closed branch without those that its last step repeats."""
     first, near = points[0] if points else None, 1e-6
     if len(points) < 2 or first is None or points[-1].kind != first.kind:
         return points

@@ -25,7 +25,7 @@ _STILL = 1e-9  # Change below which the parameter is constant, as where a conser
 
 
 def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurvePoint, float]:
-    """The curve of the solutions that bifurcate at a point, a place on it, and the amplitude there.
+    """Return the curve of the solutions that bifurcate at a point, a place on it, and the amplitude there.
 
     The place's tangent leads away. The amplitude is halved until nothing more bifurcates between the point
     and the place.
@@ -124,7 +124,7 @@ def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbit
 
 
 def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, Floats, Floats]:
-    """An ellipse around the equilibrium."""
+    """Return an ellipse around the equilibrium."""
     flow, values, x = curve.flow, curve.values_at(place.u), curve.state(place.u)
     numbers, vectors = np.linalg.eig(expansion(flow, values, x).by_state)
     turning = np.flatnonzero(numbers.imag > 0)
@@ -145,7 +145,7 @@ def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbi
 
 
 def _crossing(curve: AnyCurve, place: CurvePoint) -> tuple[AnyCurve, Floats, Floats]:
-    """The other of two directions that the equations leave free."""
+    """Return the other of two directions that the equations leave free."""
     _, matrix = curve.equations(place.u)
     dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
     free = np.linalg.svd(dense)[2][-2:]

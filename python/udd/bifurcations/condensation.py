@@ -37,7 +37,7 @@ class CyclicEquations:
     last: Floats
 
     def toarray(self) -> Floats:
-        """The matrix (m r + 1, m r + 2)."""
+        """Return the matrix (m r + 1, m r + 2)."""
         m, r, _ = self.pieces.shape
         dense = np.zeros((m, r, m, r))
         each = np.arange(m)
@@ -50,7 +50,7 @@ class CyclicEquations:
         return matrix
 
     def solve(self, row: Floats, right: Floats) -> Floats:
-        """The unknowns for these right sides (m r + 2,), of which the last is that of one more `row`.
+        """Solve for these right sides (m r + 2,), of which the last belongs to one more `row`.
 
         Two neighbouring pieces become one by an orthogonal transformation that frees the node between them,
         and so on (S. J. Wright, SIAM J. Sci. Stat. Comput. 13 (1992) 742): stable where orbits are not, in a

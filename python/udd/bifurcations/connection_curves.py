@@ -32,7 +32,7 @@ _ON = 1e-9  # Part of a step within which a point lies on the bound.
 
 @dataclass(frozen=True)
 class ConnectionWay:
-    """How a curve of connections is followed over two parameters.
+    """Settings for following a curve of connections over two parameters.
 
     Attributes
     ----------

@@ -239,7 +239,7 @@ class _Manifold:
         return None
 
     def alone(self, value: float, rest: Floats) -> Eigendirection | None:
-        """The eigendirection on its own side, a growing one first; none where there is no such."""
+        """Return the only eigendirection on its side, a growing one first; none if there are several."""
         values = self.values_at(value)
         for side in (1.0, -1.0):
             one = direction_alone(self.flow, values, rest, side)
@@ -291,7 +291,7 @@ class _Manifold:
         ]
 
     def _on(self, rows: Floats, x: Floats, spans: Floats) -> Floats:
-        """The states a step later; infinite where the run blows up."""
+        """Return the states a step later; infinite where the run blows up."""
         try:
             return self.flow.fly_each(rows, x, spans, _LOOSE)
         except IntegrationError:

@@ -45,7 +45,7 @@ class Conserved:
 
     @classmethod
     def of(cls, flow: FlowMap, text: str) -> Conserved:
-        """The quantity with this formula.
+        """Return the quantity with this formula.
 
         Raises
         ------
@@ -72,7 +72,7 @@ class Conserved:
         return made
 
     def at(self, flow: FlowMap, x: Floats) -> tuple[float, Floats]:
-        """The quantity at a reduced state, and its derivatives (r,)."""
+        """Return the quantity at a reduced state, and its derivatives (r,)."""
         found = _core.expansion(self.law, 0.0, flow.full(x).tolist(), False)
         slope: Floats = found["by_state"][0, flow.kept]
         return float(found["rate"][0]), slope
@@ -120,7 +120,7 @@ class FamilyCurve(PeriodicOrbitCurve):
         return u
 
     def span(self, u: Floats) -> float:
-        """The time until the orbit closes."""
+        """Return the time until the orbit closes."""
         return float(u[-1 if self.conserved is None else -2] * self.clock)
 
     def anchored(self, u: Floats, first: bool = False) -> Self:
@@ -134,7 +134,7 @@ class FamilyCurve(PeriodicOrbitCurve):
         return False
 
     def slope(self, u: Floats) -> Floats:
-        """The direction (r,), in scaled coordinates, in which the kept quantity grows at the first node."""
+        """Return the scaled direction (r,) in which the conserved quantity grows at the first node."""
         size, start = self.flow.size, self.nodes(u)[0]
         if self.conserved is not None:
             gradient: Floats = self.conserved.at(self.flow, start)[1] * size

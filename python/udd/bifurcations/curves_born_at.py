@@ -43,7 +43,7 @@ def fold_of_cycles_at(point: LocusPoint, bounds: Sequence[float]) -> Bifurcation
 
 
 def homoclinic_at(point: LocusPoint, bounds: Sequence[float]) -> Connection:
-    """The homoclinic orbit in which the cycles near a Bogdanov-Takens point end.
+    """Return the homoclinic orbit in which the cycles near a Bogdanov-Takens point end.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def _hopf_points(point: LocusPoint) -> list[BifurcationPoint]:
 
 
 def _as_hopf(surface: SolutionSurface, there: SurfacePoint) -> list[BifurcationPoint]:
-    """The point as one of its branch over the first parameter; none if no pair is complex there."""
+    """Return the point as one of its branch over the first parameter; None without a complex pair."""
     signs = there.functions
     pair = signs.pair
     if abs(pair.imag) * there.curve.flow.clock < 1e-4 or abs(pair.real) > 1e-6 * abs(pair.imag):

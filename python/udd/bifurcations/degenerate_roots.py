@@ -65,7 +65,7 @@ def _vanishes(system: Polynomials, x: Floats) -> bool:
 
 
 def _null(system: Polynomials) -> Floats:
-    """An orthonormal basis (n, k) of the directions in which the rates do not change at the point itself."""
+    """Return an orthonormal basis (n, k) of the directions of constant rates at the point itself."""
     matrix = system.slopes(np.zeros(system.variables))
     _, sizes, right = np.linalg.svd(matrix)
     sizes = np.append(sizes, np.zeros(len(right) - len(sizes)))
@@ -109,7 +109,7 @@ def _on_a_set(law: Law, x: Floats) -> bool:
 
 
 def _nearest(law: Law, x: Floats) -> Floats:
-    """The point of a set of roots that is nearest to the origin, as far as a descent along the set leads."""
+    """Return the point of a set of roots nearest to the origin, by a descent along the set."""
     best = x
     for _ in range(_NEAREST):
         null = _null(law(best))
@@ -125,7 +125,7 @@ def _nearest(law: Law, x: Floats) -> Floats:
 
 
 def _deflated_root(system: Polynomials) -> Floats | None:
-    """How far an isolated multiple root is from the point about which the polynomials are expanded."""
+    """Return the vector from the point of expansion to an isolated multiple root, or None."""
     random, n = np.random.default_rng(8), system.variables
     point = np.zeros(n)
     for _ in range(_DEPTH):

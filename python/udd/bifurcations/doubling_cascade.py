@@ -87,7 +87,7 @@ class Cascade(Drawable):
 
 
 def _aitken(values: Floats) -> float:
-    """The limit of a sequence whose last differences fall by one factor."""
+    """Return the limit of a sequence whose last differences fall by one factor."""
     if len(values) < 3:
         return float("nan")
     a, b, c = values[-3:]
@@ -171,7 +171,7 @@ def cascade(
 
 
 def _next(points: list[BifurcationPoint], bounds: tuple[float, float], closer: float) -> Branch:
-    """The branch born at the last doubling, up to the doubling of its own."""
+    """Return the branch born at the last doubling, up to the doubling of its own."""
     if len(points) >= _KNOWN:
         a, b, c = (point.value for point in points[-3:])
         ahead = (c - b) ** 2 / (b - a)

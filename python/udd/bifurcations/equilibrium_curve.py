@@ -36,7 +36,7 @@ class Expansion:
 
 
 def expansion(flow: FlowMap, values: Floats, x: Floats, higher: bool = False, t: float = 0.0) -> Expansion:
-    """The rates' derivatives at a reduced state; second and third ones where `higher` asks for them."""
+    """Return the rates' derivatives at a reduced state; with `higher` also the second and third ones."""
     model = flow.with_values(values)
     derivatives = _core.expansion(model, t, flow.full(x).tolist(), higher)
     k = flow.kept
@@ -76,7 +76,7 @@ class EquilibriumCurve(SolutionCurve):
         return unit
 
     def by_second(self, u: Floats, scale: float) -> Floats:
-        """The scaled rates' derivatives by the second parameter, in these units of it."""
+        """Return the scaled rates' derivatives by the second parameter, in these units of it."""
         column: Floats = self.at(u).by_parameter[self.second] * self._rates * scale
         return column
 
@@ -85,15 +85,15 @@ class EquilibriumCurve(SolutionCurve):
         return np.append(x / self.flow.size, value / self.scale)
 
     def state(self, u: Floats) -> Floats:
-        """The reduced state."""
+        """Return the reduced state."""
         return u[:-1] * self.flow.size
 
     def at(self, u: Floats) -> Expansion:
-        """The rates and their first derivatives."""
+        """Return the rates and their first derivatives."""
         return expansion(self.flow, self.values_at(u), self.state(u))
 
     def equations(self, u: Floats) -> tuple[Floats, Floats]:
-        """The scaled rates and their derivatives."""
+        """Return the scaled rates and their derivatives."""
         here = self.at(u)
         by_state = here.by_state * self._rates[:, None] * self.flow.size
         by_value = here.by_parameter[self.parameter] * self._rates * self.scale

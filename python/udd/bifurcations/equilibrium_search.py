@@ -174,7 +174,7 @@ class _Found:
 
 
 def _without_rounding(flow: FlowMap, x: Floats) -> Floats:
-    """The state with components that are nothing but rounding replaced by 0."""
+    """Return the state with components that are nothing but rounding replaced by 0."""
     small = np.abs(x) < _ROUNDING * flow.size
     if not small.any() or (x[small] == 0.0).all():
         return x + 0.0
@@ -289,7 +289,7 @@ def _differ(flow: FlowMap, a: Floats, b: Floats) -> bool:
 
 
 def refined(flow: FlowMap, values: Floats, guess: Floats, divided: Sequence[Floats] = ()) -> Floats | None:
-    """The regular equilibrium that Powell's method finds from a guess, if it is one.
+    """Return the regular equilibrium that Powell's method finds from a guess, or None.
 
     Those that are `known` are divided out (deflation), so that the method goes elsewhere. A guess at which
     the rates are undefined is replaced by its absolute values.
@@ -301,7 +301,7 @@ def refined(flow: FlowMap, values: Floats, guess: Floats, divided: Sequence[Floa
 def _rest_from(
     flow: FlowMap, values: Floats, guess: Floats, divided: Sequence[Floats] = ()
 ) -> tuple[Floats | None, bool]:
-    """The state at which Powell's method finds no rates, and whether their derivatives are regular there."""
+    """Return the state at which Powell's method finds no rates, and True if it is regular."""
     unit = flow.clock / flow.size
 
     def rates(scaled: Floats) -> Floats:

@@ -57,7 +57,7 @@ class Multipliers:
 
 
 def multipliers_at(curve: PeriodicOrbitCurve, u: Floats) -> Multipliers:
-    """The multipliers of the orbit with these unknowns.
+    """Return the multipliers of the orbit with these unknowns.
 
     The derivatives of the pieces, restricted to the planes across the flow at their ends, are never
     multiplied with one another: weak multipliers are accurate next to strong ones.

@@ -91,7 +91,7 @@ class FlowMap:
         return np.where(self._angle, -_TURN * np.round(gap / _TURN), 0.0)
 
     def index(self, parameter: str) -> int:
-        """The place of a parameter."""
+        """Return the place of a parameter."""
         if parameter not in self.names:
             raise ModelError(
                 f"{type(self.model).__name__} has no parameter {parameter!r}; it has {', '.join(self.names)}"
@@ -109,7 +109,7 @@ class FlowMap:
         return state
 
     def scaled(self, by_state: Floats) -> Floats:
-        """A derivative of states by states, shape (..., dim, dim), in units of their typical sizes."""
+        """Return a derivative of states by states, shape (..., dim, dim), in units of their typical sizes."""
         result: Floats = by_state * self.size / self.size[:, None]
         return result
 
@@ -168,7 +168,7 @@ class FlowMap:
         return [np.ones(self.dim)] + ([] if self.mirror is None else [self.mirror])
 
     def with_values(self, values: Floats) -> Model:
-        """The model with these parameters; made once for values that come several times in a row."""
+        """Return the model with these parameters; make it once for values that repeat in a row."""
         key = values.tobytes()
         if key not in self._made:
             self._made.clear()
@@ -177,7 +177,7 @@ class FlowMap:
 
 
 def flow_of(model: Model, states: Floats, forcing: Forcing | None = None) -> FlowMap:
-    """The flow of a model near these states (n, dim).
+    """Return the flow of a model near these states (n, dim).
 
     Raises
     ------

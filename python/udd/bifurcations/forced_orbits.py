@@ -36,7 +36,7 @@ class Forcing:
     law: FormulaModel
 
     def period(self, values: Floats) -> tuple[float, Floats]:
-        """The period for these parameters, and its derivatives (p,) by them."""
+        """Return the period for these parameters, and its derivatives (p,) by them."""
         law = self.law.with_parameters(dict(zip(self.law.parameters, values.tolist(), strict=True)))
         found = _core.expansion(law, 0.0, [0.0], False)
         period = float(found["rate"][0])
@@ -46,7 +46,7 @@ class Forcing:
 
 
 def forcing_of(model: Model, period: float | str) -> Forcing:
-    """The forcing with a period that is a number, or a formula of the model's parameters."""
+    """Return the forcing with a period that is a number, or a formula of the model's parameters."""
     text = period if isinstance(period, str) else repr(number("period", period, above=0.0))
     # A point is no part of a name there.
     named = {name: name.replace(".", "__") for name in model.parameters}
@@ -88,7 +88,7 @@ def repeats(
 
 
 def mirror_of(model: Model, kept: NDArray[np.intp], size: Floats, period: float) -> Floats | None:
-    """The signs (r,) under which the rates half a period later are the same, if there are such."""
+    """Return the signs (r,) under which the rates half a period later are the same, or None."""
     for signs in product((1.0, -1.0), repeat=len(kept)):
         if min(signs) < 0.0 and repeats(model, kept, size, 0.5 * period, np.array(signs)):
             return np.array(signs)

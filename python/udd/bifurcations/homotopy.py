@@ -51,12 +51,12 @@ class Roots:
 
 
 def bezout_number(system: Polynomials) -> int:
-    """The product of the degrees, which bounds the number of isolated complex roots."""
+    """Return the product of the degrees, which bounds the number of isolated complex roots."""
     return int(np.prod([int(degree) for degree in system.degrees], dtype=object))
 
 
 def complex_roots(system: Polynomials) -> Roots:
-    """The isolated roots of as many polynomials as variables.
+    """Return the isolated roots of as many polynomials as variables.
 
     The paths lead from the roots of ``x_i^d_i = 1`` to those of the system, in projective coordinates, in
     which roots at infinity are points like others (A. J. Sommese and C. W. Wampler, The Numerical Solution of
@@ -108,7 +108,7 @@ def _attempt(system: Polynomials, tolerance: float, seed: int) -> tuple[Roots, i
 
 
 def _clusters(ends: list[tuple[Complex, float]]) -> list[Complex]:
-    """The means of ends that lie nearer to each other than they still move.
+    """Return the means of ends that lie nearer to each other than they still move.
 
     The paths to a multiple root lie around it, so that their mean is nearer to it by far.
     """
@@ -156,7 +156,7 @@ class _Paths:
         self.start: Complex = start / np.linalg.norm(start, axis=1, keepdims=True)
 
     def at(self, x: Complex, t: Floats) -> tuple[Complex, Complex, Complex]:
-        """The homotopy (p, n), its derivatives (p, n, n + 1) and those by the parameter (p, n)."""
+        """Return the homotopy (p, n), its derivatives (p, n, n + 1) and those by the parameter (p, n)."""
         n, d = len(self.degrees), self.degrees
         last = x[:, :1] ** (d - 1)
         own = x[:, 1:] ** (d - 1)
@@ -170,7 +170,7 @@ class _Paths:
         return s * begin + (1.0 - s) * end, s[:, :, None] * slopes + (1.0 - s)[:, :, None] * ends, begin - end
 
     def _solve(self, x: Complex, matrix: Complex, right: Complex) -> Complex:
-        """The solution across the point itself: lengths do not matter."""
+        """Return the solution across the point itself: lengths do not matter."""
         full = np.concatenate([matrix, x.conj()[:, None, :]], axis=1)
         right = np.concatenate([right, np.zeros((len(x), 1))], axis=1)
         try:

@@ -117,13 +117,13 @@ class Segment:
         return float(np.linalg.norm(self.end.v - self.begin.v))
 
     def coarse(self) -> Segment:
-        """The step with less accurate runs."""
+        """Return the step with less accurate runs."""
         curve, surface = self.surface.curve, self.surface
         assert isinstance(curve, PeriodicOrbitCurve)
         return replace(self, surface=replace(surface, curve=replace(curve, loose=COARSE)))
 
     def at(self, part: float) -> SurfacePoint:
-        """The point of the curve at a part of the way."""
+        """Return the point of the curve at a part of the way."""
         if part == 0.0:
             return self.begin
         guess = self.begin.v + part * (self.end.v - self.begin.v)
@@ -143,7 +143,7 @@ class Segment:
 def watched_functions(
     kind: str, surface: SolutionSurface, point: SurfacePoint, slope: Floats
 ) -> dict[str, float]:
-    """The functions whose zeros are special points of a curve, by name; `slope` is that of its function."""
+    """Return the functions whose zeros are special points, by name; `slope` is that of its function."""
     signs = point.functions
     if kind == "fold":
         functions = {
@@ -172,7 +172,7 @@ def _function(kind: str, name: str, segment: Segment) -> Callable[[SurfacePoint]
 
 
 def _bend(point: SurfacePoint) -> float:
-    """How fast the first parameter's slope changes along a branch at its fold."""
+    """Return the rate of change of the first parameter's slope along a branch at its fold."""
     curve, place = point.curve, point.place
     assert isinstance(curve, EquilibriumCurve)
     at, size = _derivatives(curve, place.u), curve.flow.size
@@ -198,7 +198,7 @@ def _first_lyapunov(point: SurfacePoint) -> float:
 def points_between(
     kind: str, segment: Segment, before: dict[str, float], after: dict[str, float]
 ) -> list[tuple[float, LocusPoint]]:
-    """The special points on a step between whose ends these functions change their signs, in order."""
+    """Return the special points on a step between whose ends these functions change their signs, in order."""
     changed = [name for name, value in before.items() if value * after[name] < 0.0]
     points = []
     for name in changed:
@@ -218,7 +218,7 @@ def points_between(
 
 
 def _named(kind: str, name: str, point: SurfacePoint) -> str:
-    """The kind of the special point at which a function is zero; "" where nothing bifurcates."""
+    """Return the kind of the special point at which a function is zero; "" where nothing bifurcates."""
     if name in ("bend", "lyapunov"):
         return "cusp" if name == "bend" else "Bautin"
     values, clock = point.functions.values, point.curve.flow.clock
@@ -248,7 +248,7 @@ def _named(kind: str, name: str, point: SurfacePoint) -> str:
 
 
 def _coefficients(kind: str, point: SurfacePoint) -> dict[str, float]:
-    """The normal form's coefficients."""
+    """Return the normal form's coefficients."""
     curve, u = point.curve, point.v[:-1]
     if not isinstance(curve, EquilibriumCurve):
         return {}

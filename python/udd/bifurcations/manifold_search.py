@@ -28,7 +28,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How far from its source an orbit begins, in typical sizes; and a factor of the tolerances."""
+    """Initial distance of an orbit from its source, in typical sizes, and a factor of the tolerances."""
 
     away: float
     loose: float = 1.0

@@ -15,7 +15,7 @@ __all__ = ["state_of_attractor"]
 
 
 def state_of_attractor(model: Model, attractor: Any) -> tuple[Model, Floats, float]:
-    """The model, a state and the period of one periodic attractor of a dataset of basins or of a diagram.
+    """Return the model, a state and the period of a periodic attractor of basins or a diagram.
 
     Raises
     ------

@@ -20,7 +20,7 @@ _BEYOND = 1e-7  # Distance beyond the corner at which the other law is evaluated
 def corner_ahead(
     curve: EquilibriumCurve, here: CurvePoint, step: float
 ) -> tuple[CurvePoint, CurvePoint] | None:
-    """The corner within the next step, if there is one.
+    """Return the corner within the next step, or None.
 
     The place with the tangent that arrives there, and with the tangent that leaves it.
     """
@@ -46,7 +46,7 @@ def corner_ahead(
 def _approached(
     curve: EquilibriumCurve, here: CurvePoint, j: int, side: float, step: float
 ) -> CurvePoint | None:
-    """The corner at which a branch arrives on surface `j`.
+    """Return the corner at which a branch arrives on surface `j`.
 
     Behind the surface the branch may not go on, so that Newton's method never steps over it: all but the last
     step end before.
@@ -75,7 +75,7 @@ def _approached(
 
 
 def _other_tangent(curve: EquilibriumCurve, place: CurvePoint, j: int, side: float) -> Floats:
-    """The tangent that leaves a corner to the other side of surface `j`."""
+    """Return the tangent that leaves a corner to the other side of surface `j`."""
     beyond = place.u + _BEYOND * place.tangent
     _, matrix = curve.equations(beyond)
     # The direction that the equations of the other side leave free.

@@ -35,11 +35,11 @@ class Derivatives:
     third: Floats
 
     def b(self, u: Any, v: Any) -> Any:
-        """The second derivative along two vectors."""
+        """Return the second derivative along two vectors."""
         return np.einsum("nij,i,j->n", self.second, u, v)
 
     def c(self, u: Any, v: Any, w: Any) -> Any:
-        """The third derivative along three vectors."""
+        """Return the third derivative along three vectors."""
         return np.einsum("nijk,i,j,k->n", self.third, u, v, w)
 
 
@@ -57,7 +57,7 @@ def _hopf_vectors(by_state: Floats) -> tuple[float, Any, Any] | None:
 
 
 def first_lyapunov_coefficient(by_state: Floats, second: Floats, third: Floats) -> float:
-    """The first Lyapunov coefficient of the complex pair of eigenvalues nearest to the imaginary axis.
+    """Return the first Lyapunov coefficient of the complex pair of eigenvalues nearest to the imaginary axis.
 
     Negative where cycles are born stable. The formula is (5.39) of the book, with the right eigenvector of
     length 1; NaN where there is no complex pair.
@@ -77,7 +77,7 @@ def first_lyapunov_coefficient(by_state: Floats, second: Floats, third: Floats) 
 
 
 def second_lyapunov_coefficient(at: Callable[[Floats], Derivatives], x: Floats, size: Floats) -> float:
-    """The second Lyapunov coefficient where the first one is zero (a Bautin point).
+    """Return the second Lyapunov coefficient where the first one is zero (a Bautin point).
 
     Fourth and fifth derivatives are differences of third ones, of the fourth order in the step.
 
@@ -106,7 +106,7 @@ def second_lyapunov_coefficient(at: Callable[[Floats], Derivatives], x: Floats, 
     qc = q.conj()
 
     def d(u: Any, v: Any, z: Any, conjugate: bool = False) -> Any:
-        """The fourth derivative along q, or its conjugate, and three vectors."""
+        """Return the fourth derivative along q, or its conjugate, and three vectors."""
         return np.einsum("nijk,i,j,k->n", first.conj() if conjugate else first, u, v, z)
 
     h20 = np.linalg.solve(2j * w * eye - a, b(q, q))
@@ -145,7 +145,7 @@ def _null_vectors(by_state: Floats) -> tuple[Floats, Floats]:
 
 
 def cusp_coefficient(at: Derivatives) -> float:
-    """The coefficient ``c`` of ``w' = b1 + b2 w + c w^3`` at a cusp, for a null vector of length 1."""
+    """Return the coefficient ``c`` of ``w' = b1 + b2 w + c w^3`` at a cusp, for a null vector of length 1."""
     q, p = _null_vectors(at.by_state)
     p = p / (p @ q)
     quadratic = at.b(q, q)
@@ -155,7 +155,7 @@ def cusp_coefficient(at: Derivatives) -> float:
 
 
 def bogdanov_takens_coefficients(at: Derivatives) -> tuple[float, float]:
-    """The coefficients ``a``, ``b`` of ``u' = v, v' = ... + a u^2 + b u v`` at a Bogdanov-Takens point.
+    """Return ``a`` and ``b`` of ``u' = v, v' = ... + a u^2 + b u v`` at a Bogdanov-Takens point.
 
     The null vector has length 1.
     """
@@ -170,7 +170,7 @@ def bogdanov_takens_coefficients(at: Derivatives) -> tuple[float, float]:
 
 
 def zero_hopf_coefficients(at: Derivatives) -> tuple[float, float]:
-    """The coefficients ``s`` and ``theta`` at a zero-Hopf point, which decide its unfolding.
+    """Return the coefficients ``s`` and ``theta`` at a zero-Hopf point, which decide its unfolding.
 
     With ``u' = b u^2 + c |z|^2``, ``z' = i w z + d u z`` to the second order they are ``b c`` over its
     absolute value, and ``Re d / b``.

@@ -49,7 +49,7 @@ def orbit_states(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
 
 
 def extremes_of(curve: EquilibriumCurve | PeriodicOrbitCurve, u: Floats) -> tuple[Floats, Floats]:
-    """The least and the largest values of a solution's components, angles that nothing depends on left 0."""
+    """Return the least and the largest values of a solution's components; 0 for irrelevant angles."""
     if isinstance(curve, EquilibriumCurve):
         state = curve.flow.full(curve.state(u))
         return state, state

@@ -27,7 +27,7 @@ _FARTHEST = 1e4  # Largest ratio of the expected square to that of the first amp
 
 
 def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Branch:
-    """The branch born at a doubling, up to the doubling of its own: a few points of it.
+    """Return the branch born at a doubling, up to the doubling of its own: a few points of it.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Br
     orbits: dict[float, tuple[CurvePoint, TestFunctions]] = {}
 
     def at(square: float, near: Floats) -> Floats:
-        """The orbit at the square of an amplitude, from another one."""
+        """Return the orbit at the square of an amplitude, from another one."""
         before = float(row @ (near - base))
         bent = near - base - before * row
         # The part across the amplitude grows with its square.

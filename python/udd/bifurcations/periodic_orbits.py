@@ -176,7 +176,7 @@ def periodic_orbit(
 def _polished(
     model: Model, flow: FlowMap, nodes: Floats, span: float, mirror: Floats, shift: Floats
 ) -> PeriodicOrbit:
-    """The cycle that Newton's method finds, in its simplest form."""
+    """Return the cycle that Newton's method finds, in its simplest form."""
     curve, u = closed(flow, nodes, span, mirror, shift)
     curve, u = _simplest(curve, u)
     # The model as it was given: its edge too.
@@ -186,7 +186,7 @@ def _polished(
 def closed(
     flow: FlowMap, nodes: Floats, span: float, mirror: Floats, shift: Floats
 ) -> tuple[PeriodicOrbitCurve, Floats]:
-    """The curve at whose present parameters the orbit closes, and the unknowns there."""
+    """Close the orbit: return the curve with its parameters, and the unknowns there."""
     # The parameter is fixed: any that does not vanish will do; a model may have none.
     fixed = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
     value = 0.0 if fixed == HELD else float(flow.values[fixed])
@@ -217,7 +217,7 @@ def closed(
 
 
 def _no_cycle(curve: PeriodicOrbitCurve, u: Floats) -> str:
-    """Why what solves the equations is no cycle, if it is none."""
+    """Return the reason why a solution of the equations is no cycle, or an empty text."""
     flow, (residual, _), start = curve.flow, curve.equations(u), curve.nodes(u)[0]
     if not np.isfinite(u).all() or np.abs(residual).max() > _RESIDUAL:
         return "Newton's method does not converge"
@@ -229,7 +229,7 @@ def _no_cycle(curve: PeriodicOrbitCurve, u: Floats) -> str:
 
 
 def half_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[str, PeriodicOrbitCurve, Floats]:
-    """The bifurcation whose orbit closes after half this time, its curve and its nodes; "" for none."""
+    """Return the bifurcation whose orbit closes after half this time, its curve and nodes; "" for none."""
     flow, start, half = curve.flow, curve.nodes(u)[0], curve.span(u) / 2.0
     nodes = flown(flow, curve.values_at(u), start, half, flow.pieces_for(half))
     ways = zip(flow.images, ("period doubling", "symmetry breaking"), strict=False)
@@ -244,7 +244,7 @@ def half_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[str, PeriodicOrbitCur
 
 
 def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve, Floats]:
-    """The same cycle over its shortest part: its least period, or half of it where it is symmetric."""
+    """Return the cycle over its shortest part: its least period, or half of it if it is symmetric."""
     flow, values = curve.flow, curve.values_at(u)
     span, start = curve.span(u), curve.nodes(u)[0]
     # A symmetric cycle closes in the mirror after odd parts only.
@@ -286,7 +286,7 @@ def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve,
 
 
 def replace_values(flow: FlowMap, values: Floats) -> FlowMap:
-    """The flow whose model has these values."""
+    """Return the flow whose model has these values."""
     return replace(flow, model=flow.with_values(values))
 
 
@@ -306,7 +306,7 @@ def _shift_of(flow: FlowMap, nodes: Floats, span: float) -> Floats:
 
 
 def _return_time(flow: FlowMap, model: Model, start: Floats, longest: float) -> tuple[float, bool]:
-    """When the run from a state comes back, and whether it is its mirror image that comes back."""
+    """Return the time after which the run from a state returns, and True if its mirror image returns."""
     require_memory("states up to max_period", _FINE * longest / flow.clock, flow.dim, itemsize=40)
     count = math.ceil(_FINE * longest / flow.clock)
     times = np.linspace(0.0, longest, count + 1)

@@ -47,7 +47,7 @@ class Polynomials:
 
     @classmethod
     def of(cls, equations: list[Mapping[tuple[int, ...], float]], variables: int) -> Polynomials:
-        """The system of equations given by their terms."""
+        """Return the system of equations given by their terms."""
         every = sorted({exponents for equation in equations for exponents in equation}) or [(0,) * variables]
         place = {exponents: k for k, exponents in enumerate(every)}
         table = np.zeros((len(equations), len(every)))
@@ -98,18 +98,18 @@ class Polynomials:
         return slopes
 
     def sizes(self, x: NDArray[Any]) -> NDArray[Any]:
-        """The sums of the absolute values of the terms (..., m), of which rounding leaves a part."""
+        """Return the sums of the absolute values of the terms (..., m), of which rounding leaves a part."""
         sizes: NDArray[Any] = _monomials(self.exponents, np.abs(x)) @ np.abs(self.coefficients).T
         return sizes
 
     def scaled(self, size: Floats) -> Polynomials:
-        """The system over variables in units of `size`, each equation in units of its largest coefficient."""
+        """Return the system in units of `size`, each equation in units of its largest coefficient."""
         table = self.coefficients * np.prod(size**self.exponents, axis=1)
         largest = np.abs(table).max(axis=1, keepdims=True)
         return Polynomials(self.exponents, table / np.where(largest > 0.0, largest, 1.0))
 
     def shifted(self, x: Floats) -> Polynomials:
-        """The system as polynomials of the distance from a point, in the same units."""
+        """Return the system as polynomials of the distance from a point, in the same units."""
         equations: list[Mapping[tuple[int, ...], float]] = []
         for row in self.coefficients:
             whole: dict[tuple[int, ...], float] = {}
@@ -125,7 +125,7 @@ class Polynomials:
         return Polynomials.of(equations, self.variables)
 
     def homogeneous(self) -> Polynomials:
-        """The system with a variable in front that makes all terms of an equation have the same degree."""
+        """Return the homogeneous system: a variable in front gives all terms the same degree."""
         equations: list[Mapping[tuple[int, ...], float]] = []
         for row, degree in zip(self.coefficients, self.degrees, strict=True):
             terms = {}
@@ -161,7 +161,7 @@ class Polynomials:
 
 
 def _monomials(exponents: NDArray[np.intp], x: NDArray[Any]) -> NDArray[Any]:
-    """The monomials (..., k) at points (..., n)."""
+    """Return the monomials (..., k) at points (..., n)."""
     powers = np.ones((int(exponents.max(initial=0)) + 1, *x.shape), dtype=x.dtype)
     for d in range(1, len(powers)):
         powers[d] = powers[d - 1] * x
@@ -172,7 +172,7 @@ def _monomials(exponents: NDArray[np.intp], x: NDArray[Any]) -> NDArray[Any]:
 
 
 def numerators_of(flow: FlowMap) -> tuple[Polynomials, Polynomials] | None:
-    """The rates' numerators and denominators as polynomials of the reduced state; None for other laws."""
+    """Return the rates' numerators and denominators as polynomials of the reduced state, or None."""
     model = flow.model
     if any(model.state_names[k] in model.angles for k in flow.kept):
         return None
@@ -202,7 +202,7 @@ def _ones(n: int) -> Polynomials:
 
 
 def _cubic(flow: FlowMap) -> Polynomials | None:
-    """The rates as polynomials of at most the third degree, if that is what they are."""
+    """Return the rates as polynomials of at most the third degree, or None."""
     probes = flow.size * np.random.default_rng(9).uniform(-2.0, 2.0, (_PROBES, flow.dim))
     try:
         taylor = taylor_at(flow, flow.values, np.zeros(flow.dim))
@@ -217,7 +217,7 @@ def _cubic(flow: FlowMap) -> Polynomials | None:
 
 
 def taylor_at(flow: FlowMap, values: Floats, x: Floats) -> Polynomials:
-    """The rates' Taylor polynomials of the third degree about a reduced state, of the distance from it."""
+    """Return the rates' Taylor polynomials of the third degree about a reduced state."""
     here, n = expansion(flow, values, x, higher=True), flow.dim
     equations: list[Mapping[tuple[int, ...], float]] = []
     for i in range(n):
@@ -234,7 +234,7 @@ def taylor_at(flow: FlowMap, values: Floats, x: Floats) -> Polynomials:
 def _fraction(
     operations: list[tuple[str, int, float]], places: list[int], values: list[float], n: int
 ) -> tuple[_Terms, _Terms] | None:
-    """A formula as one polynomial over another; None if it is none."""
+    """Return a formula as one polynomial over another, or None."""
     zero: tuple[int, ...] = (0,) * n
     stack: list[tuple[_Terms, _Terms]] = []
     unit: _Terms = {zero: (1.0, 1.0)}

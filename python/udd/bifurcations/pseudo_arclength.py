@@ -71,7 +71,7 @@ class CurvePoint:
 
 
 def solve(matrix: Floats | Matrix, row: Floats, right: Floats) -> Floats:
-    """The solution of the equations below which one more row stands."""
+    """Return the solution of the equations below which one more row stands."""
     result: Floats
     if isinstance(matrix, np.ndarray):
         full = np.vstack([matrix, row])
@@ -88,7 +88,7 @@ def solve(matrix: Floats | Matrix, row: Floats, right: Floats) -> Floats:
 
 
 def natural_constraint(u: Floats) -> Floats:
-    """The direction in which the parameter, the last of the unknowns, alone rises: the row that holds it."""
+    """Return the row that fixes the parameter, which is the last of the unknowns."""
     row = np.zeros(len(u))
     row[-1] = 1.0
     return row
@@ -168,7 +168,7 @@ def nearest_of_family(
 
 
 def tangent_at(curve: Curve, u: Floats, along: Floats) -> Floats:
-    """The unit tangent at a point, in the sense of `along`."""
+    """Return the unit tangent at a point, in the sense of `along`."""
     _, matrix = curve.equations(u)
     t = solve(matrix, along, np.append(np.zeros(len(u) - 1), 1.0))
     unit: Floats = t / np.linalg.norm(t)
@@ -178,7 +178,7 @@ def tangent_at(curve: Curve, u: Floats, along: Floats) -> Floats:
 def predictor_corrector_step(
     curve: Curve, here: CurvePoint, step: float, longest: float, shortest: float = 1e-8
 ) -> tuple[CurvePoint, float, float]:
-    """The next point along the curve, its distance, and the step to be tried next.
+    """Return the next point along the curve, its distance, and the step to be tried next.
 
     Raises
     ------

@@ -89,12 +89,12 @@ class SaddleCycle:
         return self.cycle.period
 
     def height(self, x: Floats) -> Floats:
-        """How far states (..., r) are from the other manifold's tangent, along the right vector."""
+        """Return the distances of states (..., r) from the other manifold's tangent."""
         height: Floats = ((x - self.state) / self.flow.size) @ self.left
         return height
 
     def distance(self, x: Floats) -> Floats:
-        """How far states (..., r) are from the cycle's state."""
+        """Return the distances of states (..., r) from the cycle's state."""
         gap: Floats = np.linalg.norm((x - self.state) / self.flow.size, axis=-1)
         return gap
 

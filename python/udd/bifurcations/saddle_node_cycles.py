@@ -23,7 +23,7 @@ _AGREES = 1.3  # Largest factor by which the square of the period times the dist
 
 
 def saddle_node_on(branch: Branch) -> BifurcationPoint | None:
-    """The fold of equilibria in which the longest cycles of a branch end; None if they end in another way.
+    """Find the fold of equilibria at which the longest cycles of a branch end, or None.
 
     The period grows there with the inverse square root of the distance in the parameter, not with its
     logarithm, as towards an orbit homoclinic to a saddle.
@@ -44,7 +44,7 @@ def saddle_node_on(branch: Branch) -> BifurcationPoint | None:
 
 
 def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
-    """The fold of equilibria near the slowest node of a cycle."""
+    """Return the fold of equilibria near the slowest node of a cycle."""
     flow, slow = curve.flow, curve.nodes(u)[int(np.argmin(curve.speeds(u)))]
     rests = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
 

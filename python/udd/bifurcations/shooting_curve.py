@@ -79,12 +79,12 @@ class PeriodicOrbitCurve(SolutionCurve):
         return np.append(scaled, [span / self.clock, value / self.scale])
 
     def nodes(self, u: Floats) -> Floats:
-        """The nodes (m, r)."""
+        """Return the nodes (m, r)."""
         nodes: Floats = u[:-2].reshape(self.pieces, -1) * self.flow.size * np.sqrt(self.pieces)
         return nodes
 
     def span(self, u: Floats) -> float:
-        """The time until the orbit closes."""
+        """Return the time until the orbit closes."""
         return float(u[-2] * self.clock)
 
     @property
@@ -93,7 +93,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         return bool((self.mirror < 0).any())
 
     def period(self, u: Floats) -> float:
-        """The time until the orbit is back at its start."""
+        """Return the time until the orbit is back at its start."""
         return self.span(u) * (2.0 if self.symmetric else 1.0)
 
     def anchored(self, u: Floats, first: bool = False) -> Self:
@@ -113,7 +113,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         return curve
 
     def begins(self, u: Floats) -> Floats:
-        """When the pieces begin (m,); always at 0 where the law does not ask."""
+        """Return the times at which the pieces begin (m,); 0 without a forcing."""
         if self.flow.forcing is None:
             return np.zeros(self.pieces)
         return np.linspace(0.0, self.span(u), self.pieces, endpoint=False)
@@ -202,7 +202,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         return residual, CyclicEquations(by_state, 1.0 / weight, by_pair, along, last)
 
     def by_second(self, u: Floats, scale: float) -> Floats:
-        """The equations' derivatives by the second parameter, in these units of it."""
+        """Return the equations' derivatives by the second parameter, in these units of it."""
         turn = self._signs
         by_value = self.flight(u).by_parameter[:, :, 1] * turn / self.flow.size * scale
         phase, forcing = 0.0, self.flow.forcing
@@ -212,14 +212,14 @@ class PeriodicOrbitCurve(SolutionCurve):
         return np.append(by_value.ravel(), phase)
 
     def monodromy(self, u: Floats) -> Floats:
-        """The derivative (r, r) of the map from the first node to where the orbit closes."""
+        """Return the derivative (r, r) of the map from the first node to where the orbit closes."""
         product = np.eye(self.flow.dim)
         for matrix in self.flight(u).by_state:
             product = matrix @ product
         return self.mirror[:, None] * product
 
     def factors_across(self, u: Floats) -> Floats:
-        """The pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
+        """Return the pieces' derivatives (m, r - 1, r - 1) from plane to plane across the flow, scaled.
 
         Their product has the multipliers of the map that closes the orbit, the one along the flow left out.
         A forced model keeps the whole derivatives (m, r, r), with all multipliers of the stroboscopic map.

@@ -50,7 +50,7 @@ class SurfacePoint:
         return self.curve.test_functions(self.place)
 
     def ahead(self, direction: Floats) -> Floats:
-        """A direction (2,) in the plane as one of the unknowns."""
+        """Return a direction (2,) in the plane as one of the unknowns."""
         along: Floats = direction @ self.plane
         return along
 
@@ -72,13 +72,13 @@ class SolutionSurface:
         return np.array([point.curve.value(point.v[:-1]), point.v[-1] * self.scale])
 
     def start(self, place: CurvePoint) -> SurfacePoint:
-        """The point of the surface where the curve over the first parameter has this one."""
+        """Return the point of the surface where the curve over the first parameter has this one."""
         value = float(self.curve.values_at(place.u)[self.second])
         v = np.append(place.u, value / self.scale)
         return self._at(v, np.append(place.tangent, 0.0), np.append(0.0 * place.u, 1.0))
 
     def _at(self, v: Floats, along: Floats, across: Floats) -> SurfacePoint:
-        """The point with these unknowns, whose plane is oriented as two vectors are."""
+        """Return the point with these unknowns, whose plane is oriented as two vectors are."""
         curve = self._curve_at(v)
         _, matrix = curve.equations(v[:-1])
         n = len(v) - 2
@@ -93,7 +93,7 @@ class SolutionSurface:
         return self.curve.with_second(self.second, float(v[-1] * self.scale))
 
     def corrected(self, guess: Floats, base: SurfacePoint) -> SurfacePoint:
-        """The point of the surface across another one's plane through a guess."""
+        """Return the point of the surface across another one's plane through a guess."""
         first, second = base.plane
 
         def step_at(v: Floats) -> Floats:
@@ -115,7 +115,7 @@ class SolutionSurface:
         return surface, surface._at(point.v, *point.plane)
 
     def slope(self, point: SurfacePoint, name: str) -> Floats:
-        """The derivatives (2,) of a test function along the plane, by central differences."""
+        """Return the derivatives (2,) of a test function along the plane, by central differences."""
         slope = []
         for along in point.plane:
             ends = [self.corrected(point.v + h * along, point) for h in (_SMALL, -_SMALL)]
@@ -126,7 +126,7 @@ class SolutionSurface:
     def zero(
         self, base: SurfacePoint, guess: Floats, normal: Floats, name: str, reach: float
     ) -> SurfacePoint:
-        """The zero of a test function on the line through a guess along a direction (2,) of a plane.
+        """Return the zero of a test function on the line through a guess along a direction (2,) of a plane.
 
         Raises
         ------
