@@ -116,8 +116,9 @@ def discover(
     Parameters
     ----------
     measurement : Measurement or sequence of Measurement
+        The record, or several records.
     model : Disk, Pendulum or a user's own Model, or a sequence of them
-        The known model; its parameters are the start values and the means of the priors.
+        The known model. Its parameters are the start values and the means of the priors.
     free, camera, priors, each, state0
         As for :func:`udd.fit`.
     candidates : iterable of (str, formula)
@@ -125,7 +126,7 @@ def discover(
         gets the term, and the term, as in ``("v", "abs(v)*v")``. For a model with a mass matrix also a force,
         as in ``("force(b - a)", "q^5")``.
     held_out : iterable of int, optional
-        With several measurements, the numbers (from 0) of those held out whole, which no fit uses.
+        Numbers (from 0) of whole measurements that test the effects. No fit uses them.
         Effects are sought in all frames of the others, and are confirmed only by their cost on these. In
         names like ``W[0]`` the held-out measurements count last.
     budget : float, optional

@@ -43,15 +43,15 @@ class AddedEffect(OneLine):
     effect : Effect
         The effect with the parameters fitted to all data.
     title, equation, expression : str
-        Its name for a reader, its formula, and the formula with the numbers inserted.
+        Name for a reader, formula, and formula with numbers. All are plain text.
     parameters, errors : dict of str to float
-        The fitted parameters with standard errors.
+        Fitted parameters with standard errors. They are in SI units.
     chi2 : float
         Decrease in chi2 when it was added, in units of the fit's scatter.
     p : float
-        Probability of so large a decrease by chance, over all candidates.
+        Probability of so large a decrease by chance. All candidates are counted.
     ratio : tuple of float
-        Cost of the held-out frames after over before, all parameters fixed, with its 95 % interval.
+        Cost of the held-out frames after over before, with its 95 % interval. All parameters are fixed.
     witness : {"held", "fitted", "halves"}
         Test that confirms it: that cost, a further decrease in chi2 when the held-out frames are fitted too,
         or each half of the record in alternate blocks.
@@ -143,9 +143,11 @@ class Alternative(OneLine):
     instead_of : str
         Name of the effect that it could replace.
     effect : Effect
+        The candidate. Its parameters are fitted.
     title, equation : str
+        Name for a reader, and formula.
     nats : float
-        Log likelihood of the chosen form minus that of this one; negative if this one fits better.
+        Log likelihood of the chosen form minus that of this one. It is negative if this one fits better.
     likeness : float
         Likeness of their effects on these data, 0 to 1; at 1 no length of record distinguishes them.
     """
@@ -179,9 +181,10 @@ class RejectedEffect(OneLine):
     effect : Effect
         The effect with the parameters fitted to all data.
     title : str
+        Name for a reader.
     chi2, p : float
-        Decrease in chi2, in units of the remaining misfit at the same frequencies, and the probability of
-        that by chance, over all candidates, curves and surfaces.
+        Decrease in chi2, in units of the remaining misfit at the same frequencies, and its probability by
+        chance. All candidates, curves and surfaces are counted.
     errors : Errors
         Held-out errors of the model with it.
     ratio : tuple of float
@@ -228,20 +231,20 @@ class Discovery(Drawable):
     Attributes
     ----------
     verdict : str
-        ``"nothing missing"``, ``"effect identified"``, ``"effect present, form not identified"``, or ``"fits
-        the first part, not confirmed"`` if free runs over the held-out data do not confirm the effect, which
-        is then in `rejected`. ``"search not finished"`` if the time was up before anything was found.
+        ``"nothing missing"``, ``"effect identified"`` or ``"effect present, form not identified"``. ``"fits
+        the first part, not confirmed"`` if free runs over the held-out data do not confirm the effect. The
+        effect is then in `rejected`. ``"search not finished"`` if the time was up before anything was found.
     baseline, fit : Fit
-        The model without and with the added effects, each fitted to all data; the same if none was added.
+        Fits to all data without and with the added effects. They are equal if none was added.
     effects : list of AddedEffect
-        The added effects; empty if nothing is missing.
+        The added effects. Empty if nothing is missing.
     alternatives : list of Alternative
         Candidates that the data cannot distinguish from the chosen ones.
     error_before, error_after : Errors
         Held-out errors of models fitted without the held-out data, with the noise floor.
     ratio : tuple of float
-        Held-out error after over before, with its 95 % interval: for the disk at :func:`comparison_horizon`,
-        for a pendulum over the whole held-out part.
+        Held-out error after over before, with its 95 % interval. The disk's is at
+        :func:`comparison_horizon`, a pendulum's over the whole held-out part.
     scans : list of list of Scored
         Scores of all candidates, for each round of the search, the best first.
     curves : list of list of Curve
@@ -257,9 +260,9 @@ class Discovery(Drawable):
         Block averages of measurements with more frames than their motion requires; the measurements of `fit`
         are then these. Empty if all frames were used.
     budget : float or None
-        The limit in seconds, if it ended the search.
+        The limit in seconds, if it ended the search. Otherwise None.
     stopped : str or None
-        The activity at that time.
+        Stage of the search at that time. None if the search finished.
     excused : list of str or None
         If parameters of the camera were fixed: titles of the effects that the camera's errors would explain
         as well. Empty if they would explain most of the remaining misfit, or a part of an effect. None if
@@ -271,7 +274,7 @@ class Discovery(Drawable):
         Numbers of the measurements held out whole; empty if the last part of each is the held-out part. Then
         `split` is the time in the first measurement from which pictures show free runs.
     undetermined : tuple of str
-        Parameters that are not identifiable from the data; they were constrained to their given values.
+        Parameters that are not identifiable from the data. They were constrained to their given values.
     doubts : list of str
         Reasons against naming the form of the effects, in sentences.
 

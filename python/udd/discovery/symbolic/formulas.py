@@ -52,11 +52,11 @@ class Formula:
     Attributes
     ----------
     text : str
-        In the grammar of effects, with named constants.
+        Formula in the grammar of effects. Its constants have names.
     parameters : dict of str to float
-        The constants' values, SI units.
+        Values of the constants. They are in SI units.
     amplitudes : tuple of str
-        Those to which it is jointly proportional.
+        Constants to which the formula is jointly proportional.
     nats : float
         Log evidence relative to the smooth curve, minus the cost of its length and constants.
     node : tuple
