@@ -79,6 +79,12 @@ def test_a_phone_shows_the_disk_play_and_the_drive_at_once_and_scrolls(browser: 
     for part in ("#disk", "#play", "#drive input[type=range]"):
         box = page.locator(part).bounding_box()
         assert box["y"] >= 0 and box["y"] + box["height"] <= 844
+    page.click("#tour-begin")
+    page.evaluate("scrollTo(0, 1e6)")
+    below = page.locator("#maps").bounding_box()
+    assert below["y"] + below["height"] <= page.locator("#tour").bounding_box()["y"]  # nothing stays covered
+    page.click("#tour-end")
+    page.evaluate("scrollTo(0, 0)")
     assert page.locator("#plane").is_visible()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert page.eval_on_selector("#phase", "e => getComputedStyle(e).touchAction") == "pan-y"
