@@ -46,5 +46,5 @@ def test_one_version_everywhere() -> None:
     citation = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
     assert citation is not None
     assert citation[1] == cargo
-    # Cargo writes 0.2.0-dev, Python 0.2.0.dev0.
+    # Cargo and Python write a development version differently.
     assert Version(version("udd")) == Version(cargo)
