@@ -54,7 +54,9 @@ demo: .venv/.ready-demo ## from the sample film to the report: run the main job 
 docs: .venv/.ready-docs ## build the documentation into docs/_build/html; every page is run, and a warning is an error
 	$(STEP) "docs" $(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
-test: .venv/.ready-test test-rust test-python ## build everything and run all tests (cargo and pytest)
+# Side by side: the compiler uses one core for part of its time.
+test: .venv/.ready-test ## build everything and run all tests (cargo and pytest)
+	@$(MAKE) --no-print-directory BESIDE=1 -j2 -k --output-sync=line test-rust test-python
 
 test-rust: ## only the tests of the Rust core; needs no Python
 	$(STEP) "cargo test" cargo test --locked --no-fail-fast

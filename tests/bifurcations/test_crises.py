@@ -70,7 +70,7 @@ def test_mirror_images_merge() -> None:
     def sides(w: float) -> float:
         """The share of section points of one attractor on the rarer side of its mirror plane."""
         start = high.cycle.state + 1e-3
-        points = udd.poincare(udd.DLE(w), n=6000, state0=start, transient=200).component("y")
+        points = udd.poincare(udd.DLE(w), n=3000, state0=start, transient=200).component("y")
         near = points[:, None] - np.unique(np.round(-points, 3))
         return float((np.abs(near).min(axis=1) < 2e-3).mean())
 

@@ -42,12 +42,12 @@ def test_the_fan_of_a_pendulum_covers_as_often_as_it_says() -> None:
     ahead, inside, z = np.array([0.0, 1.0, 4.0, 18.0]), [], []
     for rng in np.random.default_rng(2).spawn(30):
         truth = udd.Pendulum(rng.uniform(0.5, 1.5), k0=rng.uniform(0.005, 0.03))
-        t = np.arange(0, 40, 0.1)
+        t = np.arange(0, 40, 0.2)
         theta = udd.simulate(truth, t, [0.0, rng.uniform(0.3, 1.2)]).state[:, 1]
         seen = udd.Measurement(t, {"theta": theta + 2e-3 * rng.standard_normal(len(t))})
         fitted = udd.fit(seen.slice(0, 20), udd.Pendulum(1.02 * truth.length, k0=0.02))
         result = udd.forecast(seen, fitted, ahead, start=20.0, members=100, level=0.8)
-        true = theta[np.round(result.t / 0.1).astype(int), None]
+        true = theta[np.round(result.t / 0.2).astype(int), None]
         inside.append((true >= result.low) & (true <= result.high))
         z.append((true - result.members.mean(axis=0)) / result.members.std(axis=0))
     # 30 records and four times that go together within a record: between 30 and 120 draws with p = 0.8, whose

@@ -71,7 +71,9 @@ def fitted(measured: udd.Measurement, model: udd.Model) -> tuple[udd.Fit | None,
 
 
 @pytest.mark.parametrize("hidden", STRONG)
-@pytest.mark.parametrize("factor", [0.01, 0.1, 10, 100, 1000])
+@pytest.mark.parametrize(
+    "factor", [0.01, 100, *(pytest.param(f, marks=pytest.mark.nightly) for f in (0.1, 10, 1000))]
+)
 def test_a_drive_in_another_unit_is_reported(hidden, factor):
     result, said = fitted(record(hidden), udd.Disk(factor * DRIVE))
     if result is None or not abs(result.parameters["W"] / DRIVE - 1) < 0.05:

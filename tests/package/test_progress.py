@@ -14,7 +14,7 @@ import pytest
 import udd
 from udd._util.progress import progress_bar, status
 
-TIMES = np.arange(0, 14, 0.05)
+TIMES = np.arange(0, 14, 0.1)
 NOISE = 1e-3 * np.random.default_rng(0).standard_normal(len(TIMES))
 SWING = udd.Measurement(TIMES, {"theta": 0.5 * np.exp(-TIMES / 50) * np.cos(3.13 * TIMES) + NOISE})
 
