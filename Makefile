@@ -71,7 +71,7 @@ fuzz: .venv/.ready-test ## hostile inputs for an hour: formulas, tables, files, 
 	$(PY) tests/fuzz/campaign.py $(ARGS)
 
 test-browser: .venv/.browser ## the page in Debian's chromium (ARGS="-k link" for some of it)
-	$(STEP) "pytest in a browser" env UDD_BROWSER=1 $(PY) -m pytest tests/browser $(ARGS)
+	$(STEP) "pytest in a browser" env UDD_BROWSER=1 $(PY) -m pytest tests/browser --durations=15 $(ARGS)
 
 bench-page: .venv/.browser ## the page's frames per second and its delay from slider to frame
 	$(PY) benches/python/page.py
