@@ -14,8 +14,8 @@ from udd.effects import Effect
 from udd.errors import FitError
 from udd.fitting import Fit, at_level, released
 
-#: Answer of a record: the effect is significant in it; or it is not, and would be; or one of the same strength
-#: could not be detected.
+#: Answer of a record: the effect is significant in it; or it is not, but would be; or one of the same
+#: strength could not be detected.
 Answer = Literal["wants it", "does not want it", "cannot tell"]
 
 
@@ -48,9 +48,9 @@ def by_record(
 ) -> tuple[list[RecordAnswer], float]:
     """Fit the amplitudes of an effect to each record separately, and test each against zero (Wald).
 
-    Everything else stays common to the records and is refitted with them. The answer is negative only if the record
-    could show the effect: at the mean strength in the other records, chance would hide it with a probability
-    below 0.1 %.
+    Everything else stays common to the records and is refitted with them. The answer is negative only if the
+    record could show the effect: at the mean strength in the other records, chance would hide it with a
+    probability below 0.1 %.
 
     Parameters
     ----------
