@@ -115,6 +115,7 @@ def test_where_there_can_be_none() -> None:
         udd.connection(udd.continuation(orbit, "period", (6.6, 7.0)))
 
 
+@pytest.mark.nightly  # test_lorenz_has_his_homoclinic_orbit asks the same of another model
 def test_a_jerk_equation_has_its_homoclinic_orbit_by_default() -> None:
     model = udd.Model(["x", "v", "a"], ["v", "a", "-a - 0.4*v + mu*x*(1 - x)"], {"mu": 0.7})
     (one,) = udd.connections(model, "mu", (0.73985982, 0.73985983), n=2)

@@ -159,6 +159,7 @@ def test_homoclinic_orbits_are_followed_over_two_parameters() -> None:
     assert curve.values[0, 0] / np.sqrt(0.25) == pytest.approx(5 / 7, rel=0.3)
 
 
+@pytest.mark.nightly  # test_homoclinic_orbits_are_followed_over_two_parameters follows another
 def test_a_shilnikov_orbit_of_the_damped_model_leads_to_that_without_damping() -> None:
     found = udd.connections(udd.DLE(3.38), "w", (3.37686, 3.37687), n=2, t_max=11.0)
     one = next(one for one in found if one.kind == "homoclinic")

@@ -13,7 +13,8 @@ from browser_for_tests import Opened, until
 SAMPLE = Path(udd.__file__).parent / "demo" / "sample.mp4"
 
 
-@pytest.mark.slow
+# test_a_driven_pendulum_goes_from_its_table_to_the_verdict and test_the_demonstration ask for the two halves.
+@pytest.mark.nightly
 def test_the_sample_film_is_uploaded_to_its_verdict(opened: Opened) -> None:
     page = opened.go()
     page.click("#to-film")

@@ -148,6 +148,7 @@ def test_a_link_may_hold_a_comma_and_numbers_beyond_the_sliders(opened: Opened) 
     assert page.locator(DRIVE).input_value() == "25.00"
 
 
+@pytest.mark.nightly  # tests/app/test_app_budgets.py asks the server for the same
 def test_a_run_that_takes_too_much_says_so_on_the_stage(opened: Opened) -> None:
     page = opened.page
     page.goto(opened.link + "#model=disk&W=0.03&k0=10000000&state=0,0.001,0.04,0")
