@@ -421,7 +421,8 @@ def test_a_failure_after_the_clicks_says_where_they_are(
 
     sat.append(skip)
     config = tmp_path / "disk.toml"
-    assert main(["track", str(made.path), "--click", str(config), "--disk-radius", "0.08"]) == 1
+    argv = ["track", str(made.path), "--click", str(config), "--out", str(tmp_path / "m.csv")]
+    assert main([*argv, "--disk-radius", "0.08"]) == 1
     said = capsys.readouterr().err
     assert "no disk with marks" in said and f"what was clicked is written: {config}" in said
     assert settings(config) == {"disk_radius": 0.08}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from dataclasses import FrozenInstanceError, fields
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,13 @@ import udd
 from film_for_tests import FPS, RADIUS, frame, rolling, write
 from udd.calibration_items import ITEMS, SWITCHES, Calibrate, Estimate, table
 from udd.cli import main
+from udd.errors import UddError
 from udd.tracking import TrackError, TrackOptions
 from udd.tracking.calibration.config import read_options, settings
 
 OLD = (
     *("disk_radius", "mark_distance", "fps", "pivot", "refine", "layout", "scale", "region"),
-    *("calibrate", "sigma", "apart", "bob", "length"),
+    *("calibrate", "sigma", "apart", "bob", "length", "leave_out", "clicks"),
 )
 
 
@@ -94,3 +96,24 @@ def test_a_config_of_tags_or_of_a_bob_stays_one() -> None:
     assert again.scale == 1500.0 and again.tags == tags.tags and again.layout == tags.layout
     bob = TrackOptions(bob="red", length=1.0)
     assert read_options(bob, length=1.2).length == 1.2 and read_options(bob, length=1.2).layout == bob.layout
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("leave_out", "3,x", "leave_out must be numbers of frames"),
+        ("leave_out", [[20, 10]], "leave_out must be numbers of frames"),
+        ("leave_out", [1.5], "leave_out must be numbers of frames"),
+        ("clicks", {"marks": [[1, 2, 3]]}, "marks must have places u, v"),
+        ("clicks", {"mark": [[1, 2]]}, "clicks has no 'mark'"),
+        ("clicks", {"points": [[1, 2], [3, 4]]}, "points must be two, with their distance"),
+        ("clicks", "frame=1.5", "frame must be the number of a frame"),
+        ("clicks", "pivot=1:2:3", "pivot must have places u, v"),
+        ("clicks", "pivot", "clicks must be like frame=12"),
+        ("clicks", {"marks": [[1, 2]] * 100}, "at most 64 points"),
+    ],
+)
+def test_clicks_and_frames_to_leave_out_are_checked(option: str, value: Any, words: str) -> None:
+    with pytest.raises(UddError, match=re.escape(words)) as caught:
+        TrackOptions(**{option: value})
+    assert len(str(caught.value)) <= 300

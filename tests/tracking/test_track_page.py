@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +15,12 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 import tracked
 import udd
+from clicked_places import edge, marks
 from small_films import shot
+from tracked_errors import errors, rms
 from udd.cli import main
 from udd.errors import UddError
-from udd.film import Defects
+from udd.film import Defects, Film
 from udd.report.tracking import calibration, chosen
 from udd.tracking import page
 from udd.tracking.metric.rolling_check import health
@@ -101,19 +105,38 @@ def test_what_is_no_film_has_no_page(tmp_path: Path, film: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_refused_film_leaves_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    film, page = (
-        shot(tmp_path / "no_red.mp4", 1.0, defects=Defects(mark_strength=(0, 0, 1, 1))),
-        tmp_path / "why.html",
-    )
-    assert main(["track", str(film.path), "--out", str(tmp_path / "a.csv"), "--page", str(page)]) == 1
+def clicked(film: Film, frame: int) -> str:
+    """The text of clicks on the blue and the green mark, and on the disk's edge."""
+    points = [("mark", marks(film, frame, (2, 3))), ("edge", edge(film, frame))]
+    places = [f"{name}={u:.1f}:{v:.1f}" for name, some in points for u, v in some]
+    return ",".join([f"frame={frame}", *places])
+
+
+def test_a_refused_film_leaves_a_page_and_clicks_track_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    film = shot(tmp_path / "no_red.mp4", 2.0, defects=Defects(mark_strength=(0, 0, 1, 1)))
+    page, table = tmp_path / "no_red-refused.html", tmp_path / "a.csv"
+    assert main(["track", str(film.path), "--out", str(table)]) == 1
     said = capsys.readouterr().err
     assert "no disk with marks in red, orange, blue and green" in said and f"written: {page}" in said
     html = page.read_text(encoding="utf-8")
-    assert "no disk with marks in red" in html and html.count("data:image/jpeg") == 6
+    assert "no disk with marks in red" in html and html.count('<img src="data:image/jpeg') == 6
     cells = re.findall(r"<t[dh][^>]*>([^<]*)</t[dh]>", html)
     counts = {name: cells[cells.index(name) + 1] for name in ("red", "orange", "blue", "green")}
     assert counts["red"].startswith("0 of") and not counts["blue"].startswith("0 of")
+    data = json.loads(re.findall(r'class="clicks-data">(.*)</script>', html)[0])
+    assert data["command"] == f"udd track {film.path} --out {table}" and len(data["frames"]) == 8
+    frame = data["frames"][0]["index"]
+    assert (
+        main([*shlex.split(data["command"]), "--clicks", clicked(film, frame), "--leave-out", "10-12"][1:])
+        == 0
+    )
+    m = udd.read_measurement(table)
+    e = errors(m, film)
+    e[:, 2] -= np.nanmedian(e[:, 2])  # beta counts from the blue mark
+    assert m.seen.sum() > 40 and (rms(e) < (0.2, 0.2, 4)).all()
+    assert [k for k, flag in enumerate(m.flag) if flag.startswith("omitted")] == [10, 11, 12]
 
 
 def test_a_wrong_option_leaves_no_page(tmp_path: Path) -> None:

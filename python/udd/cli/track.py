@@ -104,6 +104,17 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--distance", type=float, metavar="M", help="with --click: between two points to click, for the scale"
     )
+    parser.add_argument(
+        "--leave-out",
+        metavar="FRAMES",
+        help="frames that are not used, such as 3,10-20 (the first is 0)",
+    )
+    parser.add_argument(
+        "--clicks",
+        metavar="POINTS",
+        help="points clicked in a frame [pixels], as the page of a refused film writes them: "
+        "frame=12,pivot=275:310,mark=200:100",
+    )
     parser.add_argument("--fast", action="store_true", help="without the second pass")
     parser.add_argument(
         "--smooth", action="store_true", help="average the noise over neighbouring frames (not for fits)"
@@ -127,7 +138,7 @@ def add(commands: Any) -> None:
         action=OutputFile,
         endings=PAGES,
         metavar="HTML",
-        help="page to write: what was found, and how well",
+        help="page to write: the motion and its errors; a refused film leaves one anyway, NAME-refused.html",
     )
     add_partial(parser)
     parser.add_argument("--W", type=float, help="drive speed [m/s], to be noted in the header")
@@ -203,15 +214,20 @@ def _of_pictures(folder: Path) -> bool:
     return bool(images_in(str(folder))) and not any(is_film(file) for file in folder.iterdir())
 
 
-def _explain(args: argparse.Namespace, options: dict[str, Any], reason: str) -> None:
-    """Write the page of a film that is refused, if a page was asked for."""
-    if args.page is None:
-        return
+def _explain(args: argparse.Namespace, options: dict[str, Any], reason: str) -> Path | None:
+    """Write the page of a film that is refused."""
     from udd.report.refused_film import write_refused
 
+    page = args.page
+    if page is None:  # where the table would be
+        out = Path() if args.out is None else args.out
+        page = (out if args.out is None or out.is_dir() else out.parent) / f"{args.file.stem}-refused.html"
     given = {"disk_radius": args.disk_radius, **options}
-    if write_refused(args.file, reason, args.page, given=given, command=_command(args)):
-        print(f"udd: written: {args.page}, which shows why the film was refused", file=sys.stderr)
+    commands = _command(args), _command(args, without=("pivot", "region", "fps", "leave_out", "clicks"))
+    if not write_refused(args.file, reason, page, given=given, commands=commands):
+        return None
+    print(f"udd: written: {page}; open it to see the frames and to click what you know", file=sys.stderr)
+    return Path(page)
 
 
 def _code(m: Measurement) -> int:
@@ -251,19 +267,25 @@ def _record(args: argparse.Namespace) -> tuple[str, dict[str, Any]]:
 
 _SAID = (
     *("disk_radius", "mark_distance", "fps", "pivot", "scale", "region", "calibrate", "bob", "length"),
-    "config",
+    *("leave_out", "clicks", "config"),
 )
 
 
-def _command(args: argparse.Namespace) -> str:
-    """Return the command that makes the page again."""
-    words = ["udd", "track", args.file.name]
+def _command(args: argparse.Namespace, without: tuple[str, ...] = ()) -> str:
+    """Return the command that makes the page again; one for other values of some options has full paths."""
+
+    def said(path: Path) -> str:
+        return str(path) if without else path.name
+
+    words = ["udd", "track", said(args.file)]
     for name in _SAID:
         value = getattr(args, name)
-        if value is not None:
+        if value is not None and name not in without:
             words += [f"--{name.replace('_', '-')}", str(value)]
     words += ["--fast"] if args.fast else []
-    return shlex.join([*words, "--page", args.page.name])
+    if without and args.out is not None:
+        words += ["--out", str(args.out)]
+    return shlex.join(words if args.page is None else [*words, "--page", said(args.page)])
 
 
 def _tracked(
@@ -307,6 +329,7 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
     if args.calibrate is not None:
         options["calibrate"] = _calibrate(args.calibrate)
     options |= {"bob": None if args.bob is None else _bob(args.bob), "length": args.length}
+    options |= {"leave_out": args.leave_out, "clicks": args.clicks}
     return {**options, "refine": False if args.fast else None, "config": args.config}
 
 
@@ -401,7 +424,8 @@ def _folder(args: argparse.Namespace) -> CommandResult:
         except UddError as error:
             failed += 1
             lines.append(f"{film.name}: {error}")
-            rows.append({"film": film.name, "error": str(error)})
+            page = _explain(args, options, str(error))
+            rows.append({"film": film.name, "error": str(error), **({} if page is None else {"page": page})})
             continue
         table = args.out / f"{film.stem}.csv"
         m.to_csv(table)

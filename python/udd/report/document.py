@@ -157,7 +157,15 @@ class Table(OneLine):
         return [[plain(c.title) for c in self.columns], *([plain(cell) for cell in row] for row in self.rows)]
 
 
-Part = Paragraph | Subheading | Bullets | Figure | Gallery | Table
+@dataclass(frozen=True, repr=False)
+class Clickable(OneLine):
+    """Frames of a film to click on; `data` is JSON for ``clicks.js``."""
+
+    kind: ClassVar[str] = "clickable"
+    data: Markup
+
+
+Part = Paragraph | Subheading | Bullets | Figure | Gallery | Table | Clickable
 
 
 @dataclass(frozen=True, repr=False)

@@ -143,12 +143,14 @@ def refuse_folder(path: str | os.PathLike[str]) -> None:
         raise UddError(f"{Path(path)} is a folder, not a page to write to")
 
 
-def write_page(report: Report, path: str | os.PathLike[str]) -> None:
-    """Write a report as one HTML page."""
+def write_page(
+    report: Report, path: str | os.PathLike[str], guide: tuple[tuple[str, str], ...] = GUIDE
+) -> None:
+    """Write a report as one HTML page; `guide` explains its terms."""
     page = templates("udd.report").get_template("report.html")
     html = page.render(
         head=report.head,
-        guide=GUIDE,
+        guide=guide,
         data=_data(report),
         sections=report.sections,
         source=report.source,

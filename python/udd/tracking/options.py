@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, TypedDict
 
@@ -16,6 +16,8 @@ from udd.calibration_items import SWITCHES, Calibrate
 from udd.markers.layout import STANDARD, Layout, read_bob, read_layout
 from udd.markers.tags import Tag, is_tags, layout_of, read_tags
 from udd.video.reader import Picture, Rates, TrackError, frame_rates
+
+from .clicks import Clicks, read_clicks, read_stretches
 
 Region = tuple[float, float, float, float]
 MarkSeparation = tuple[int, int, float]  # numbers of two marks, from 1, and their distance [m]
@@ -53,6 +55,8 @@ class MoreOptions(TypedDict, total=False):
     sigma: Sigma | Mapping[str, float] | None
     apart: MarkSeparation | None
     length: float | None
+    leave_out: Sequence[int | Sequence[int]] | None
+    clicks: Clicks | Mapping[str, Any] | None
 
 
 @dataclass(frozen=True)
@@ -116,6 +120,13 @@ class TrackOptions:
     )
     bob: Any = field(default=None, metadata=_entry("the colour of a pendulum's bob"))
     length: float | None = field(default=None, metadata=_entry("a positive number of metres", "m"))
+    leave_out: tuple[tuple[int, int], ...] = field(
+        default=(),
+        metadata=_entry("numbers of frames, or pairs [first, last]", "frames that are not used, from 0"),
+    )
+    clicks: Clicks | None = field(
+        default=None, metadata=_entry("a table of clicked points", "points clicked in a frame, pixels")
+    )
     tags: tuple[Tag, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
@@ -371,6 +382,8 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "apart": read_apart,
     "bob": _bob,
     "length": positive,
+    "leave_out": read_stretches,
+    "clicks": read_clicks,
 }
 FIELDS = {f.name: f for f in fields(TrackOptions) if f.init}
 _OF_A_DISK = ("disk_radius", "mark_distance", "layout", "sigma", "apart")

@@ -29,6 +29,7 @@ from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost, lost
 from udd.tracking.detection.recognition import placed, recognise
 from udd.tracking.detection.survey import Survey, survey
 from udd.tracking.geometry.pose import DiskAppearance, Pose
+from udd.tracking.manual.clicked_options import with_clicks
 from udd.tracking.metric.apparent_gravity import ApparentGravity, apparent_gravity
 from udd.tracking.metric.calibration_report import camera_of, meta_of
 from udd.tracking.metric.common_errors import common_mode_errors
@@ -153,16 +154,21 @@ def track(
         ``apart``: (int, int, float), numbers of two marks (from 1; of the standard ones that is red) and the
         distance of their middles [m], measured on the disk: that sets the scale.
         ``length``: with `bob`, from the pendulum's pivot to the bob's middle [m]; sets the scale.
+        ``leave_out``: numbers of frames, or pairs (first, last), that are not used (flag ``omitted``).
+        ``clicks``: points clicked in one frame [pixels], a mapping: ``frame`` (its number), ``pivot``,
+        ``marks`` (their middles), ``edge`` (three points of the disk's edge, or its centre), ``points`` (two)
+        and their ``distance`` [m]. beta is 0 if the first mark is above the disk's centre. The film improves
+        the clicked values within the errors of clicks.
 
     Returns
     -------
     Measurement
         One row per frame: ``Y, Z`` [m] and ``beta`` [rad, unwrapped] at mid-exposure, with standard errors
         and correlations. A frame that cannot be used holds NaN, with the reason in ``flag`` (``dup``,
-        ``black``, ``damaged``, ``vague``, ``lost``, ``gone``). The flags ``gap`` (frames are missing before
-        it) and ``degraded`` are remarks. ``quality`` holds number of marks, completeness, residual, blur and
-        method of each frame. ``meta`` holds the camera: ``px_per_m``, ``pivot_u``, ``pivot_v``,
-        ``exposure``, ..., and in ``calibration`` every item as value, standard error and how it is known.
+        ``black``, ``damaged``, ``omitted``, ``vague``, ``lost``, ``gone``). The flags ``gap`` (frames are
+        missing before it) and ``degraded`` are remarks. ``quality`` holds number of marks, completeness,
+        residual, blur and method of each frame. ``meta`` holds the camera: ``px_per_m``, ``pivot_u``,
+        ``pivot_v``, ``exposure``, ..., and in ``calibration`` every item as value, standard error and source.
 
     Raises
     ------
@@ -228,6 +234,9 @@ def run_tracker(
     """Track as `track` does, and return the poses in pixels as well if the film shows a disk."""
     options = read_options(config, **given)
     film = Film(video, fps=options.fps)
+    film.left_out = options.leave_out
+    if options.clicks is not None:
+        options = with_clicks(film, options, options.clicks)
     if options.bob is not None:
         with _bar(film, film.packets, "track", progress) as bar:
             return track_bob(film, options, lambda _: bar.update())

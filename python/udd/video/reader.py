@@ -40,6 +40,7 @@ class Picture:
     u: Plane
     v: Plane
     damaged: bool = False  # it, or one it was coded from, did not decode whole
+    left_out: bool = False  # by the user; it counts as damaged then
 
 
 def light_of_codes(full_range: bool) -> NDArray[np.float64]:
@@ -161,6 +162,7 @@ class Film:
             self.clock_note = f"times by the tag com.android.capture.fps: {captured:g} frames per second"
             self.fps = float(captured)
         self.correct: Callable[[Picture], Picture] | None = None  # what is done to each picture
+        self.left_out: tuple[tuple[int, int], ...] = ()  # first and last frames of the parts without use
 
     @property
     def clock_text(self) -> str:
@@ -198,6 +200,8 @@ class Film:
                     picture = replace(picture, t=self.clock.at(picture.t, parts=2))
                 if self.slower:
                     picture = replace(picture, t=real_time(picture.t, self.slower))
+                if any(first <= picture.index <= last for first, last in self.left_out):
+                    picture = replace(picture, damaged=True, left_out=True)
                 yield picture if self.correct is None else self.correct(picture)
             self.broken = decoder.broken
         finally:

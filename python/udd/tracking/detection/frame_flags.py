@@ -13,6 +13,7 @@ UNCHANGED = 12  # pixels that may differ by more; an edge that moves by one pixe
 BLANK = 6.0  # brightness contrast of a black frame
 DAMAGED = "damaged: the frame does not decode whole"
 BLACK = "black: the frame shows nothing"
+OMITTED = "omitted: left out by the user"
 REPEATED = "dup: the frame repeats the one before"
 VAGUE = "vague: too blurred or hidden to be placed"
 GONE = "gone: the disk has left the wheels"
@@ -20,9 +21,14 @@ GONE = "gone: the disk has left the wheels"
 
 def unusable(picture: Picture) -> str:
     """Return the flag of a picture that shows nothing; empty if it may show something."""
-    if picture.damaged:
-        return DAMAGED
-    return BLACK if float(picture.y[::8, ::8].std()) < BLANK else ""
+    return unread(picture) or (BLACK if float(picture.y[::8, ::8].std()) < BLANK else "")
+
+
+def unread(picture: Picture) -> str:
+    """Return the flag of a picture that is not used at all; empty if it is used."""
+    if picture.left_out:
+        return OMITTED
+    return DAMAGED if picture.damaged else ""
 
 
 def is_copy(y: Plane, last: Plane, places: Iterable[complex], reach: int) -> bool:

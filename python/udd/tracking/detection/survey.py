@@ -70,6 +70,8 @@ def survey(film: Film) -> Survey:
         raise TrackError(f"{film.path}: no frame can be decoded")
     if frames < FEWEST:
         raise TrackError(f"{film.path} is too short: {frames} frames, at least {FEWEST} are needed")
+    if not bursts:
+        raise TrackError(f"{film.path}: no frame is left: each one is damaged or left out")
     step = -(-len(bursts) // most)
     return Survey([b for b in bursts[::step] if b], frames, film.broken, height, width)
 

@@ -15,7 +15,7 @@ from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.correction import applied
 from udd.tracking.detection.bob import Background, Blob, BobColour, bob_colour, locate_bob, usual_area
 from udd.tracking.detection.camera_motion import CameraMotion, steadied
-from udd.tracking.detection.frame_flags import BLACK, BLANK, DAMAGED, REPEATED, is_copy, lost
+from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, is_copy, lost, unread
 from udd.tracking.detection.survey import survey
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
@@ -109,11 +109,9 @@ def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
 
 
 def _flag(picture: Picture, behind: Picture) -> str:
-    if picture.damaged:
-        return DAMAGED
     some, usual = picture.y[::8, ::8], behind.y[::8, ::8].astype(np.int16)
     black = float(some.std()) < BLANK and float(np.abs(some - usual).mean()) > BLANK
-    return BLACK if black else ""
+    return unread(picture) or (BLACK if black else "")
 
 
 def _copy(y: NDArray[np.uint8], last: NDArray[np.uint8], blob: Blob, path: Sequence[complex]) -> bool:
