@@ -7,8 +7,10 @@ import pytest
 
 import udd
 from discovered import in_air
+from udd._util.parallel import parallel_map
 from udd.discovery import time_budget
 from udd.errors import FitError
+from udd.fitting.solve import solve
 from udd.fitting.thinning import thinned
 from udd.report import as_text, summary_of
 
@@ -49,6 +51,23 @@ def test_what_passed_before_the_time_was_up_stands(monkeypatch):
     assert [f.title for f in result.effects] == ["quadratic drag"]
     assert result.stopped == "scoring candidates for a further effect"
     assert "further effects were not tried" in as_text(summary_of(result)).splitlines()[0]
+
+
+def test_no_fit_of_a_stage_starts_once_the_time_is_up():
+    # A curve takes dozens of fits; before, all of them ran: 117 s after a budget of 40 s.
+    measured, model = in_air()
+    fitted = udd.fit(measured.slice(0, 5), model)
+    clock = time_budget.Clock(60.0, str)
+
+    def again(_piece: int) -> udd.fitting.Fit:
+        return solve(fitted.measurements, fitted.problem, fitted.point)
+
+    with clock.limited():
+        assert [fit.chi2 for fit in parallel_map(again, range(2))] == [again(0).chi2] * 2
+        clock.end = 0.0
+        with pytest.raises(time_budget.TimeUpError):
+            parallel_map(again, range(2))
+    assert again(0).converged  # the last fits run in any case
 
 
 @pytest.mark.parametrize("budget", [0.0, -1.0, "soon", float("nan")])

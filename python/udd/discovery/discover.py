@@ -307,7 +307,8 @@ def _answer(
     if unexplained and not rejected and end.rounds:
         try:
             search.clock.tell("trying the closest candidates")
-            rejected = search.rejected(begin, end.rounds[-1], data.order)
+            with search.clock.limited():
+                rejected = search.rejected(begin, end.rounds[-1], data.order)
         except TimeUpError as up:
             stopped = stopped or str(up)
     doubtful = any(a.likeness < SAME for a in others)

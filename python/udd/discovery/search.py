@@ -76,7 +76,8 @@ class Search:
         states = [begin]
         stopped = None
         try:
-            self._forward_selection(accepted, states, rounds)
+            with self.clock.limited():
+                self._forward_selection(accepted, states, rounds)
         except TimeUpError as up:
             stopped = str(up)
         number = self._confirmed_by_free_runs(known_model or states[0], states)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from typing import TypeVar
 
 import numpy as np
 
 from udd._util.parallel import parallel_map
+from udd._util.time_limit import limited
 from udd.errors import FitError
 
 From = TypeVar("From")
@@ -61,6 +63,10 @@ class Clock:
         """Raise TimeUpError once the time is up."""
         if time.monotonic() > self.end:
             raise TimeUpError(self.doing)
+
+    def limited(self) -> AbstractContextManager[None]:
+        """Limit the work inside: no fit starts once the time is up."""
+        return limited(self.check)
 
     def watched(self, work: Callable[[From], To]) -> Callable[[From], To]:
         """Wrap work so that it does not start once the time is up."""

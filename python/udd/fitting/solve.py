@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import _core
+from udd._util.time_limit import check_time
 from udd.errors import FitError, ModelError
 from udd.measurement import Measurement
 from udd.models import Model
@@ -49,8 +50,10 @@ def solve(
 ) -> Fit:
     """Minimise once, for the problem's assumed model error, from a point.
 
-    It stops when a step promises to decrease chi2 by less than `decrease`.
+    It stops when a step promises to decrease chi2 by less than `decrease`. It does not start once the time of
+    a search is up.
     """
+    check_time()
     try:
         result = _core.solve(problem.at(point), iterations, decrease)
     except ValueError as error:
