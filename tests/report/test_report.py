@@ -27,6 +27,7 @@ from udd.fitting.parameter_meanings import meaning
 from udd.report import runs, tables
 from udd.report import wording as words
 from udd.report.discovery_report import head as head_of
+from udd.report.loose_fit import loosest
 
 _VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -368,6 +369,18 @@ def test_errors_of_the_known_model_contain_what_it_lacks() -> None:
     unit = {"m/s": 1.0, "cm/s": 1e2, "mm/s": 1e3}[str(row["unit"])]
     assert error == pytest.approx(unit * alone.errors["W"], rel=0.2)
     assert alone.errors["W"] > 20 * found.baseline.errors["W"]
+
+
+def test_a_written_model_of_a_pendulum_keeps_its_own_model_error() -> None:
+    # The record is a pendulum's, the model is text: the model errors assumed for pendulums are not its own.
+    t = np.arange(0, 6, 0.05)
+    measurement = udd.Measurement(t, {"theta": 0.4 * np.cos(3 * t) * np.exp(-0.1 * t**1.5)})
+    model = udd.Model(
+        ["theta", "omega"], {"theta": "omega", "omega": "-a*sin(theta)-k*omega"}, {"a": 9.0, "k": 0.01}
+    )
+    fit = loosest(udd.fit(measurement, model))
+    assert fit.problem.diffusion in fit.problem.schedule
+    assert fit.with_diagnostics().errors.keys() == {"a", "k"}
 
 
 def test_an_error_below_the_noise_is_called_no_more_than_noise() -> None:
