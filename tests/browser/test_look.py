@@ -83,6 +83,11 @@ def test_a_phone_shows_the_disk_play_and_the_drive_at_once_and_scrolls(browser: 
     # Nothing stays covered; the page may still grow after the first scroll.
     bottom, top = (f"document.querySelector('{part}').getBoundingClientRect()" for part in ("#maps", "#tour"))
     until(page, f"scrollTo(0, 1e6), {bottom}.bottom <= {top}.top")
+    # A step shows what it speaks of: the balance, then the section.
+    for tab in ("energy", "section"):
+        page.click("#tour-next")
+        until(page, f"document.querySelector('#tab-{tab}').getBoundingClientRect().top >= 0")
+        until(page, f"document.querySelector('#pane-{tab} canvas').getBoundingClientRect().top < 500")
     page.click("#tour-end")
     page.evaluate("scrollTo(0, 0)")
     assert page.locator("#plane").is_visible()
@@ -133,6 +138,10 @@ def test_the_tour_has_six_steps_with_aims_and_questions(opened: Opened) -> None:
     for k in range(6):
         assert page.locator("#tour-title").text_content().startswith(f"{k + 1} of 6: ")
         assert page.locator("#tour-question").text_content().endswith("?")
+        assert page.locator("#tour button:visible").count() == (2 if k == 5 else 3)
+        # The box covers nothing of the stage.
+        tour, stage = (page.locator(part).bounding_box() for part in ("#tour", "#stage"))
+        assert stage is None or tour["x"] + tour["width"] <= stage["x"]
         if k == 3:
             assert page.is_checked("#twin")
         page.click("#tour-next")

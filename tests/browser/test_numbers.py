@@ -159,3 +159,15 @@ def test_a_run_that_takes_too_much_says_so_on_the_stage(opened: Opened) -> None:
     typed(page, "#parameters .slider:nth-child(3) .number", "0,01")
     page.wait_for_selector("#over", state="hidden")
     until(page, "udd.player.at > 10")
+
+
+def test_a_number_with_many_digits_is_rounded_for_the_eye_only(opened: Opened) -> None:
+    page = opened.go("#model=disk&W=0.04199979431&effect=relaxation:b=5.999963826&state=2,0.02,-0.02,0")
+    field = page.locator("#effects .number")
+    assert (page.input_value(DRIVE), field.input_value()) == ("4.2", "6")
+    assert field.get_attribute("title") == "5.999963826"
+    field.focus()
+    field.dispatch_event("change")
+    assert page.evaluate("[udd.home.model.W, udd.home.model.effects[0].b]") == [0.04199979431, 5.999963826]
+    page.click("#tab-what")
+    until(page, "document.getElementById('equations').textContent.includes('W_c = W − b W Z')")

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from markupsafe import Markup
-
 from udd.errors import ModelError
 from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
@@ -56,7 +54,7 @@ def of(discovery: Any) -> dict[str, Any]:
 
 def _symbols(text: str) -> str:
     """Return a formula or a sentence with Greek letters and minus signs, and indices as in W_c."""
-    return text_of(Markup(wording.pretty(text).replace("<sub>", "_")))
+    return text_of(wording.pretty(text))
 
 
 def _constants(discovery: Any) -> list[dict[str, str]]:

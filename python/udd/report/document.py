@@ -26,8 +26,8 @@ def plain(text: Text) -> str:
 
 
 def text_of(markup: object) -> str:
-    """Return markup as plain text, with raised exponents."""
-    raised = re.sub(r"<sup>(.*?)</sup>", lambda m: m[1].translate(_RAISED), str(markup))
+    """Return markup as plain text, with raised exponents, and indices as in W_c."""
+    raised = re.sub(r"<sup>(.*?)</sup>", lambda m: m[1].translate(_RAISED), str(markup)).replace("<sub>", "_")
     return html.unescape(re.sub(r"<[^>]*>", "", raised))
 
 

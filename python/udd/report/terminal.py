@@ -87,7 +87,7 @@ def _number(number: Number) -> str:
 
 def _line(text: Text) -> str:
     """Text without tags and without symbols that a terminal may lack."""
-    bare = text_of(text.replace("<sub>", "_")) if isinstance(text, Markup) else text
+    bare = text_of(text) if isinstance(text, Markup) else text
     spelt = re.sub("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+", lambda m: f"^{m[0].translate(_RAISED)}", bare)
     for symbol, name in _ASCII.items():
         spelt = spelt.replace(symbol, name)

@@ -35,7 +35,7 @@ class Page {
     this.diagram = new Diagram(this.link, this);
     this.energy = new Energy(this);
     this.series = new Series(this);
-    this.what = new What();
+    this.what = new What(catalogue.effects);
     this.look = new Look();
     this.loop = new Loop(this.link, this);
     this.disk = new DiskView($("disk"), (place, done) => this.drag(place, done));
@@ -152,6 +152,7 @@ class Page {
       this.panel.preset("");
       this.begin({ ...model, W }, state);
       this.play(true);
+      return twin || tab === "what" ? $("figure-disk") : $("maps");
     };
     return [
       show(0, false, "what"),
@@ -159,7 +160,7 @@ class Page {
       show(0.03, false, "section"),
       show(0.03, true, "section"),
       show(0.03, false, "diagram"),
-      ...(this.catalogue.classroom ? [] : [() => this.page($("to-film"))]),
+      ...(this.catalogue.classroom ? [] : [() => (this.page($("to-film")), $("sample"))]),
     ];
   }
 

@@ -2,6 +2,7 @@
 import { t } from "./texts.js";
 
 const NUMBER = /^[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?$/i;
+const WIDEST = 7; // characters that a field shows
 
 /** The number in a text, whose decimal sign is a point or a comma; NaN if there is none. */
 export function parse(text) {
@@ -53,7 +54,8 @@ export class NumberField {
     const { wrong } = this;
     this.mark(wrong);
     if (wrong) return undefined;
-    return this.input.value.trim() ? parse(this.input.value) : null;
+    const { value } = this.input;
+    return value === this.rounded?.text ? this.rounded.value : value.trim() ? parse(value) : null;
   }
 
   /** What is wrong with what stands there; "" if nothing is. */
@@ -62,14 +64,19 @@ export class NumberField {
     return !text && this.about.optional ? "" : outside(parse(text), text, this.about);
   }
 
+  /** Show a number's text; one with too many digits for the field is rounded, and in full in the tooltip. */
   show(text) {
-    this.input.value = text;
+    const value = parse(text);
+    const brief = text.length > WIDEST && !Number.isNaN(value) ? String(+value.toPrecision(5)) : text;
+    this.rounded = brief === text ? null : { text: brief, value };
+    this.input.value = brief;
+    this.input.title = this.rounded ? text : "";
     this.mark("");
   }
 
   step(e) {
     const by = { ArrowUp: 1, ArrowDown: -1 }[e.key];
-    const value = parse(this.input.value);
+    const value = this.input.value === this.rounded?.text ? this.rounded.value : parse(this.input.value);
     if (!by || Number.isNaN(value)) return;
     e.preventDefault();
     this.input.value = String(+(value + by * this.about.step).toPrecision(12));

@@ -4,7 +4,7 @@ import { list, t } from "./texts.js";
 const $ = (id) => document.getElementById(id);
 
 export class Tour {
-  /** `steps`: what the page does at each step. */
+  /** `steps`: functions that prepare the page for each step and return the element to look at. */
   constructor(steps) {
     this.steps = steps;
     this.words = list("tour_steps");
@@ -23,9 +23,14 @@ export class Tour {
     $("tour-aim").textContent = aim;
     $("tour-question").textContent = question;
     $("tour-back").disabled = this.at === 0;
-    $("tour-next").textContent = t(this.at + 1 < this.steps.length ? "tour_next" : "tour_end");
-    this.steps[this.at]();
+    const last = this.at + 1 === this.steps.length;
+    $("tour-next").textContent = t(last ? "tour_end" : "tour_next");
+    $("tour-end").hidden = last;
+    const shown = this.steps[this.at]();
     $("tour-next").focus();
+    document.body.style.setProperty("--tour", `${$("tour").offsetHeight + 16}px`);
+    // On a narrow screen the page scrolls: what the step speaks of must stand above this box.
+    shown?.scrollIntoView({ block: "nearest" });
   }
 
   end() {
