@@ -21,7 +21,9 @@ from starlette.testclient import TestClient
 
 import udd
 from app_for_tests import CHAOS, SOCKET, client
+from small_films import shot
 from udd.app import error_text, jobs, limits, report_parts, uploads, worker
+from udd.film import Defects
 from udd.report.document import Column, Figure, Gallery, Head, Image, Report, Section, Table
 
 __all__ = ["client"]
@@ -124,6 +126,29 @@ def test_a_film_that_is_cut_off_is_refused(client: TestClient) -> None:
     said = sent(client, whole[: len(whole) // 3], W="0.042")
     assert said["state"] == "failed"
     assert "cut off" in said["answer"]["error"]
+
+
+def test_a_refused_film_stays_for_clicks(client: TestClient, tmp_path: Path) -> None:
+    pytest.importorskip("cv2")
+    film = shot(tmp_path / "no_red.mp4", 0.6, defects=Defects(mark_strength=(0, 0, 1, 1)))
+    said = sent(client, film.path.read_bytes(), W="0.039")
+    assert said["state"] == "failed" and [p["name"] for p in said["answer"]["parts"]] == [jobs.REFUSED]
+    data = client.get(f"/api/jobs/{said['job']}/{jobs.REFUSED}").json()
+    assert data["size"] == [276, 350] and data["frames"][0]["uri"].startswith("data:image/jpeg")
+    where = {"of": said["job"]}
+    clicked = {"clicks": {"frame": 99, "pivot": [138, 166]}, "leave_out": [[3, 4]]}
+    answer = client.post("/api/jobs/again", params=where, content=json.dumps(clicked))
+    again = ended(client, answer.json()["job"])
+    assert again["answer"]["error"].startswith("Clicks: there is no frame 99")
+    kept = client.get(f"/api/jobs/{again['job']}/{jobs.REFUSED}").json()["start"]
+    assert kept["pivot"] == [[138, 166]] and kept["leave_out"] == "3-4"
+    for params, content, words in (
+        ({"of": "none"}, "{}", "choose it again"),
+        (where, '{"config": "/etc/passwd"}', "has no 'config'"),
+        (where, "no JSON", "JSON"),
+    ):
+        answer = client.post("/api/jobs/again", params=params, content=content)
+        assert answer.status_code == 400 and words in answer.text
 
 
 def test_an_upload_is_no_larger_than_fits(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ pytest.importorskip("axe_playwright_python", reason="the browser's tests are not
 
 from axe_playwright_python.sync_playwright import Axe
 
-from browser_for_tests import SIZES, until
+from browser_for_tests import SIZES, Opened, until
 from clicked_places import edge, marks
 from small_films import shot
 from udd.cli import main
@@ -86,3 +86,26 @@ def test_clicks_become_a_command(browser: Any, refused: tuple[Film, Path], size:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert [v["id"] for v in Axe().run(page).response["violations"]] == []
         assert said == []
+
+
+def test_the_page_tracks_the_film_again(opened: Opened, refused: tuple[Film, Path]) -> None:
+    film, _ = refused
+    page = opened.go()
+    page.click("#to-film")
+    page.set_input_files("#file", film.path)
+    page.fill("#loop-W", "3.9")
+    page.click("#go")
+    page.wait_for_selector("#refused:not([hidden])")
+    assert page.locator("#failed").text_content().startswith("No disk with marks in red")
+    assert page.locator("#track-again").is_disabled()
+    page.locator(".clicks canvas").scroll_into_view_if_needed()
+    frame = int(page.locator(".clicks output").text_content().split()[1].rstrip(","))
+    click(page, film, "marks", marks(film, frame, (2, 3)))
+    assert page.locator("#track-again").is_disabled()
+    click(page, film, "edge", edge(film, frame))
+    assert Axe().run(page).violations_count == 0
+    page.click("#track-again")
+    # It was refused because red and orange are missing. Now it is tracked, and a model is fitted.
+    until(page, "document.getElementById('stages').textContent.includes('fit')", 90)
+    page.click("#cancel")
+    until(page, "document.getElementById('failed').textContent === 'Cancelled.'")

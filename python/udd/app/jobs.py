@@ -22,6 +22,7 @@ Send = Callable[[dict[str, Any] | bytes], None]
 
 _LINE = 8 << 20  # bytes of a message from a job
 ENDED = ("done", "failed", "cancelled")
+REFUSED = "refused.json"  # of a failed job: frames to click on, for another job with the same film
 
 
 @dataclass
@@ -68,8 +69,12 @@ class Job:
 
     def file(self, name: str) -> Path | None:
         """One of the files that it made, by a name that it gave."""
-        part_names = {part["name"] for part in self.answer.get("parts", ())}
-        return self.folder / "out" / name if name in part_names else None
+        return self.folder / "out" / name if name in self.part_names else None
+
+    @property
+    def part_names(self) -> set[str]:
+        """Names of the files that it made."""
+        return {part["name"] for part in self.answer.get("parts", ())}
 
 
 class Jobs:
@@ -196,7 +201,9 @@ def _kill(job: Job) -> None:
 
 
 def _empty(job: Job) -> None:
-    """Delete what was uploaded, and the folder of a job that has made nothing."""
+    """Delete what was uploaded, and the folder of a job that has made nothing; keep a film for clicks."""
+    if REFUSED in job.part_names:
+        return
     if job.state == "done" or (job.state == "failed" and job.answer.get("parts")):
         (job.folder / job.asked.get("file", "none")).unlink(missing_ok=True)
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import os
 import secrets
 import shutil
 from collections.abc import AsyncIterator, Callable, Coroutine
@@ -21,7 +22,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from udd._util.number_text import number_in
-from udd._util.tables import parsed
+from udd._util.tables import parsed, table
 from udd.errors import UddError
 from udd.models import Disk
 
@@ -31,13 +32,14 @@ from .class_pages import Pages
 from .error_text import sentence
 from .folders import workspace
 from .growing_run import as_csv
-from .jobs import Jobs
+from .jobs import REFUSED, Jobs
 from .presets import catalogue
 from .security import REPORT_POLICY, Guard
 from .spec import start_of
 from .stream import Page
 
 STATIC = Path(__file__).parent / "static"
+HINTS = ("clicks", "region", "fps", "leave_out")  # options of the tracker that a page may send
 
 
 def make_app(
@@ -79,7 +81,11 @@ def make_app(
     async def about(_: Request) -> Response:
         return JSONResponse({**catalogue(), "classroom": classroom})
 
-    async def table(request: Request) -> Response:
+    async def clicks(_: Request) -> Response:
+        with as_file(files("udd.report") / "templates" / "clicks.js") as script:
+            return Response(script.read_bytes(), media_type="text/javascript")
+
+    async def run_table(request: Request) -> Response:
         start = start_of(parsed("the run", request.query_params.get("run", "")))
         seconds = _number(request, "seconds") or math.nan
         shown = request.query_params.get("units") == "shown"
@@ -90,7 +96,9 @@ def make_app(
         kind = request.path_params["kind"]
         folder = uploads.private_folder(state["folder"])
         try:
-            asked = await _asked(kind, request, folder)
+            asked = await (
+                _again(jobs, request, folder) if kind == "again" else _asked(kind, request, folder)
+            )
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
@@ -124,8 +132,9 @@ def make_app(
     routes = [
         Route("/", page),
         Route("/api/catalogue", about),
-        Route("/api/run.csv", table),
+        Route("/api/run.csv", run_table),
         WebSocketRoute("/api/socket", socket),
+        Route("/static/clicks.js", clicks),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     files_routes = [
@@ -173,6 +182,16 @@ async def _while_there(request: Request, work: Coroutine[Any, Any, Any]) -> Any:
 def new_token() -> str:
     """Return a new secret for the link."""
     return secrets.token_urlsafe(24)
+
+
+async def _again(jobs: Jobs, request: Request, folder: Path) -> dict[str, Any]:
+    """Return the question of a job with a refused film again, with what was clicked in it."""
+    hints = table("the clicks", parsed("the clicks", await uploads.text(request.stream())), HINTS)
+    job = jobs.jobs.get(request.query_params.get("of", ""))
+    if job is None or REFUSED not in job.part_names:
+        raise UddError("The film is not here any more: choose it again.")
+    os.link(job.folder / job.asked["file"], folder / job.asked["file"])
+    return {**job.asked, "hints": hints}
 
 
 async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from udd.errors import UddError
 
 from . import child_process, limits
 from .error_text import sentence
+from .jobs import REFUSED
 
 OUT = Path("out")
 _PICTURES_EVERY = 0.2  # s between the frames that are shown
@@ -68,9 +69,9 @@ def main() -> None:
 
 
 def _kept() -> list[dict[str, str]]:
-    """List what a job leaves that failed after its film was tracked: the measured motion."""
-    table = OUT / "measurement.csv"
-    return [{"name": table.name, "title": "The measured motion"}] if table.is_file() else []
+    """List what a failed job leaves: the motion, if the film was tracked, or frames of a refused film."""
+    kept = {"measurement.csv": "The measured motion", REFUSED: "Frames of the film"}
+    return [{"name": name, "title": title} for name, title in kept.items() if (OUT / name).is_file()]
 
 
 def _sentence(error: object, file: str) -> str:
@@ -93,7 +94,9 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     film = asked["film"]
     tell({"say": "reading the film" if film else "reading the table"})
     if film:
-        measurement = _tracked(file, constants.get("R", 0.08), tell, "W" in constants).with_meta(**constants)
+        hints = asked.get("hints") or {}
+        measurement = _tracked(file, constants.get("R", 0.08), hints, tell, "W" in constants)
+        measurement = measurement.with_meta(**constants)
     else:
         measurement = measurement_of(file, asked.get("columns") or [], constants)
     measurement.to_csv(OUT / "measurement.csv")
@@ -122,8 +125,8 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     return {**result.of(discovery), "parts": report_parts.save_parts(report, OUT)}
 
 
-def _tracked(file: Path, radius: float, tell: Tell, drive: bool = True) -> Any:
-    """Track a film, and show it meanwhile."""
+def _tracked(file: Path, radius: float, hints: dict[str, Any], tell: Tell, drive: bool = True) -> Any:
+    """Track a film with what was clicked in it, and show it meanwhile; a refused film leaves frames."""
     import cv2
 
     from udd.tracking import Film, TrackedFrame, TrackError, track_disk
@@ -161,7 +164,20 @@ def _tracked(file: Path, radius: float, tell: Tell, drive: bool = True) -> Any:
             frame["centre"] = [factor * c for c in seen.centre]
         tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
 
-    return track_disk(file, disk_radius=radius, watch=watch).measurement
+    try:
+        return track_disk(file, disk_radius=radius, watch=watch, config=hints).measurement
+    except UddError:
+        _leave_frames(file, hints)
+        raise
+
+
+def _leave_frames(file: Path, hints: dict[str, Any]) -> None:
+    """Write frames to click on, and the clicks so far."""
+    from udd.report.refused_film import click_data, look
+
+    refused = look(file, hints) or look(file, {})  # clicks that cannot be used are no reason to show nothing
+    if refused is not None:
+        (OUT / REFUSED).write_text(as_json(click_data(refused)), encoding="utf-8")
 
 
 def _render(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:

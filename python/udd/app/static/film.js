@@ -1,4 +1,5 @@
 // The loop: a film or a table goes in, the verdict comes out.
+import { Clicks, WORDS } from "./clicks.js";
 import { Columns } from "./columns.js";
 import { address, request } from "./link.js";
 import { recalled, remember } from "./look.js";
@@ -8,6 +9,7 @@ import { list, t } from "./texts.js";
 
 const $ = (id) => document.getElementById(id);
 const FILMS = /\.(mp4|mov|m4v|avi|mkv|webm|mpg|mpeg|wmv|mts|m2ts|ts|3gp|ogv|flv|h264|dv)$/i;
+const REFUSED = "refused.json";
 const MARKS = ["#e41a1c", "#ff9f1c", "#2b6cff", "#1fae4b"];
 
 export class Loop {
@@ -24,6 +26,7 @@ export class Loop {
     this.columns = new Columns(() => this.tell());
     $("file").addEventListener("change", () => this.choose($("file").files[0]));
     $("go").addEventListener("click", () => this.send());
+    $("track-again").addEventListener("click", () => this.again());
     $("sample").addEventListener("click", () => this.begin("sample"));
     $("cancel").addEventListener("click", () => this.cancel());
     $("another").addEventListener("click", () => {
@@ -156,7 +159,7 @@ export class Loop {
 
   async begin(kind, values = {}, body = undefined) {
     this.fail("");
-    this.stages([t(body ? "loop_uploading" : "loop_waiting")]);
+    this.stages([t(kind === "film" ? "loop_uploading" : "loop_waiting")]);
     const canvas = $("frames");
     canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
     canvas.parentElement.hidden = true;
@@ -182,8 +185,26 @@ export class Loop {
     if (text) remember("job", "");
     this.show("ask");
     $("failed").textContent = text;
-    $("kept").hidden = !parts.length;
-    $("kept").replaceChildren(...(parts.length ? [t("loop_kept"), ...parts.map((part) => this.linkTo(part))] : []));
+    const kept = parts.filter(({ name }) => name !== REFUSED);
+    $("kept").hidden = !kept.length;
+    $("kept").replaceChildren(...(kept.length ? [t("loop_kept"), ...kept.map((part) => this.linkTo(part))] : []));
+    $("refused").hidden = true;
+    if (kept.length < parts.length) this.offerClicks();
+  }
+
+  /** Show frames of a refused film, to click what is known of it. */
+  async offerClicks() {
+    const { job } = this, answer = await request(`/api/jobs/${job}/${REFUSED}`), data = await answer.json();
+    if (job !== this.job || !$("failed").textContent) return;
+    const words = Object.fromEntries(Object.keys(WORDS).map((name) => [name, t(`clicks_${name}`)]));
+    $("refused").hidden = false;
+    this.clicks = new Clicks(document.querySelector("#refused .clicks"), data, words, ({ problem, empty }) => {
+      $("track-again").disabled = Boolean(problem) || empty;
+    });
+  }
+
+  async again() {
+    await this.begin("again", { of: this.job }, JSON.stringify(this.clicks.value));
   }
 
   linkTo({ name, title }) {

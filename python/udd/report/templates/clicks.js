@@ -1,6 +1,6 @@
 // Clicks on frames of a film: contact, two points, marks, edge, region, bob, and frames to leave out.
 // The page of a refused film holds this file, and the app loads it: both give the options of `udd track`.
-const WORDS = {
+export const WORDS = {
   tools: "Click on the frame",
   pivot: "Contact",
   points: "Two points",
