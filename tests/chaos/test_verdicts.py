@@ -43,6 +43,41 @@ def test_verdicts(model: udd.Model, start: list[float], verdict: str, dimension:
     assert found.dimension == dimension or np.isnan([found.dimension, dimension]).all()
 
 
+# Decays that are slower than any exponential. The distance from 0 falls with a power of the time.
+@pytest.mark.parametrize(
+    ("rates", "start"),
+    [
+        (["-x^3"], [1.0]),
+        (["-x^3"], [-0.01]),
+        (["-x^3"], [1e4]),
+        (["-(x - 5)^5"], [3.0]),
+        (["-1e-9*x"], [3.0]),
+        (["-x^2"], [1.0]),
+        (["v", "-v - x^3"], [10.0, 0.0]),
+        (["x*v", "-v - x^2"], [1.0, 1.0]),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::udd.errors.ConvergenceWarning")  # exponents that end at 0
+def test_a_slow_decay_is_no_escape(rates: list[str], start: list[float]) -> None:
+    assert udd.lyapunov_spectrum(udd.Model(XV[: len(rates)], rates), state0=start).verdict == "equilibrium"
+
+
+# The same laws with other signs, and speeds that fall with the time.
+@pytest.mark.parametrize(
+    ("rates", "start"),
+    [
+        (["1/(1 + x^2)"], [0.0]),
+        (["x^3"], [1e-3]),
+        (["-x^2"], [-1.0]),
+        (["x*v", "-v + x^2"], [0.1, 0.1]),
+        (["2*x*v + 3*x^3", "-v - x^2"], [0.1, 0.1]),
+        (["-x^3", "1"], [1.0, 0.0]),
+    ],
+)
+def test_a_slow_escape_is_no_decay(rates: list[str], start: list[float]) -> None:
+    assert udd.lyapunov_spectrum(udd.Model(XV[: len(rates)], rates), state0=start).verdict == "escapes"
+
+
 def test_a_running_phase_has_its_period() -> None:
     # Adler's equation: T = 2 pi/sqrt(a^2 - 1).
     model = udd.Model(["q"], ["a - sin(q)"], {"a": 1.5}, angles=["q"])

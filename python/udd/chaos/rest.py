@@ -17,7 +17,7 @@ __all__ = ["Equilibrium", "RestTest", "equilibrium_near"]
 
 _Floats = NDArray[np.float64]
 
-_STEPS = 100  # Iterations of Newton's method.
+_STEPS = 300  # Iterations of Newton's method: near a multiple root each removes but a part of the distance.
 _SAME = 1e-10  # An iteration below this part of the state, or of all steps, is the last.
 _REST = 1e-6  # Share of the first rates that may remain.
 _ROUNDING = 1e-14  # Share of the largest component: no step is more accurate.
@@ -27,6 +27,7 @@ _SPANS = 10.0  # Times of the slowest decay for which an orbit is followed.
 _LEAVES = 40.0  # The same of the slowest growth: rounding is large then, if no symmetry forbids it.
 _LEFT = 0.1  # Share of the largest distance that may remain then.
 _SAMPLES = 200
+_PARTS = np.geomspace(0.1, 1.0, 30)  # Shares of the distance at which the rate must have one sign.
 _TIMES = (0.0, 0.7371)  # in typical times: an equilibrium of rates that depend on time is there at both
 
 
@@ -119,7 +120,8 @@ class RestTest:
                 return None
         if rest.repels and attracts:
             return None
-        return self._settled(state, rest, noise)
+        end = self._settled(state, rest, noise)
+        return rest if end is None and self._creeps(state, rest, noise) else end
 
     def _settled(self, state: _Floats, rest: Equilibrium, noise: _Floats) -> Equilibrium | None:
         """Return the equilibrium that an orbit is near after several times its slowest decay."""
@@ -144,3 +146,29 @@ class RestTest:
         # One that leaves may happen to be near again at the end.
         stays = (away[quarter:].max(axis=0) <= first + noise).all()
         return end if stays and (late <= _LEFT * first + noise).all() else None
+
+    def _creeps(self, state: _Floats, rest: Equilibrium, noise: _Floats) -> bool:
+        """Return True if the orbit comes along the only slow direction, in which the rates lead to the end.
+
+        Such a decay may be slower than any exponential, as that of x' = -x^3, and last for any time.
+        """
+        numbers, right = np.linalg.eig(rest.slopes)
+        slow = int(np.argmin(np.abs(numbers)))
+        decay = -np.delete(numbers, slow).real
+        least = _ZERO * np.abs(numbers).max()
+        if rest.repels or numbers[slow].imag != 0.0 or (decay <= least).any():
+            return False
+        # The fast directions decay meanwhile.
+        span = min(_SPANS / float(decay.min()) if len(decay) else self.clock, self.longest)
+        states = states_along(self.model, span, _SAMPLES + 1, state, self.rtol, self.atol)
+        if states is None:
+            return False
+        away = states[_SAMPLES // 4 :, self.kept] - rest.state
+        if (np.abs(away[1:]) > np.abs(away[:-1]) + noise).any():
+            return False
+        along = np.linalg.pinv(right)[slow].real
+        places = np.repeat(states[-1:], len(_PARTS), axis=0)
+        places[:, self.kept] = rest.state + _PARTS[:, None] * away[-1]
+        times = _TIMES if self.model.names_time else _TIMES[:1]
+        rates = [self.model.rates(np.full(len(places), t * self.clock), places)[:, self.kept] for t in times]
+        return bool((np.array(rates) @ along * (away[-1] @ along) < 0.0).all())
