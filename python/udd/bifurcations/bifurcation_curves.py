@@ -19,16 +19,14 @@ from udd.errors import IntegrationError, ModelError
 from .bifurcation_functions import FUNCTIONS
 from .branch import BifurcationPoint
 from .branch_continuation import bounds_of, in_unit_of, unit_of
-from .branch_ends import hopf_end, vanishing_part
+from .branch_ends import hopf_end
 from .branch_following import CLOSED
 from .connecting_orbits import Connection
 from .connection_curves import ConnectionWay
-from .conservative_families import FamilyCurve
 from .curves_born_at import fold_of_cycles_at, homoclinic_at
 from .flow_map import Floats
 from .locus_points import ENDS, LocusPlace, LocusPoint, LocusTrace, Segment, points_between, watched_functions
 from .pseudo_arclength import CorrectorFailed
-from .shooting_curve import PeriodicOrbitCurve
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
 
@@ -236,7 +234,7 @@ def _followed(
         raise ModelError("a bifurcation point of udd.continuation is needed")
     if point.kind not in FUNCTIONS or point.kind == "branch point":
         raise ModelError(f"a curve of points of the kind {point.kind} is not followed")
-    if isinstance(point._curve, FamilyCurve):
+    if point._curve.family:
         raise ModelError("points of a family of cycles are not followed over a second parameter")
     second = point._curve.flow.index(parameter)
     start = np.array([point.value, point._curve.values_at(point._place.u)[second]])
@@ -265,8 +263,7 @@ def _place(surface: SolutionSurface, kind: str, point: SurfacePoint) -> LocusPla
 
 def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> list[LocusPoint]:
     """Find the Bautin point near a small cycle at its fold, along the curve of Hopf points."""
-    curve = point.curve
-    hopf = hopf_end(curve, point.v[:-1]) if isinstance(curve, PeriodicOrbitCurve) else None
+    hopf = hopf_end(point.curve, point.v[:-1])
     if hopf is None or hopf._curve is None or hopf._place is None:
         return []
     rests = SolutionSurface(hopf._curve, surface.second, surface.scale)
@@ -301,7 +298,7 @@ class _Way:
             try:
                 surface, here = surface.anchored(here)
                 slope = surface.slope(here, FUNCTIONS[self.kind])
-                before = watched_functions(self.kind, surface, here, slope) if before is None else before
+                before = watched_functions(self.kind, here, slope) if before is None else before
                 segment, ahead, after, step = self._step(surface, here, slope, along, step)
             except (CorrectorFailed, IntegrationError) as error:
                 trace.end = f"lost: {error}"
@@ -328,7 +325,7 @@ class _Way:
         while step >= _SHORTEST:
             try:
                 there = surface.zero(here, here.v + step * ahead, normal, name, step)
-                after = watched_functions(self.kind, surface, there, surface.slope(there, name))
+                after = watched_functions(self.kind, there, surface.slope(there, name))
                 segment = Segment(surface, name, here, normal, there)
                 if (there.v - here.v) @ ahead > _TURN * segment.length:
                     return segment, ahead, after, step
@@ -342,7 +339,7 @@ class _Way:
     ) -> None:
         """Note the special points of a segment, and the end of the curve if it ends there."""
         surface, here, there = segment.surface, segment.begin, segment.end
-        if vanishing_part(here.curve, here.v[:-1], there.v[:-1]) is not None:
+        if here.curve.vanishing_part(here.v[:-1], there.v[:-1]) is not None:
             # Folds of cycles are born at a Bautin point, where the cycles have no size.
             points = _bautin_near(here, surface, self.box) if self.kind == "fold" else []
             trace.points += points

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -13,9 +12,8 @@ from udd.errors import IntegrationError
 from .bifurcation_functions import FUNCTIONS, STILL, TestFunctions
 from .branch import AnyCurve, BifurcationPoint
 from .equilibrium_curve import EquilibriumCurve
-from .error_bounds import COARSE, rounding_of, scatter
+from .error_bounds import rounding_of, scatter
 from .flow_map import Floats
-from .orbit_geometry import as_liouville
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
@@ -87,7 +85,7 @@ def bifurcations_between(
         except (CorrectorFailed, ValueError):
             continue
         here = curve.test_functions(place)
-        if isinstance(curve, PeriodicOrbitCurve) and not as_liouville(curve, place.u):
+        if not curve.follows_liouville(place.u):
             continue
         kind = curve.kind_at(name, here)
         if kind:
@@ -214,7 +212,7 @@ def location_error(
     from the rounding of the test function, measured near its zero; the period is that of the cycles born
     there.
     """
-    if isinstance(curve, EquilibriumCurve):
+    if curve.kind == "equilibrium":
         return _scatter(curve, a, sigma, place, step, name)
 
     def at(distance: float, own: PeriodicOrbitCurve = curve) -> tuple[float, Floats]:
@@ -225,7 +223,7 @@ def location_error(
     located = np.array([curve.value(place.u), curve.period(place.u)])
     aside = 1e-3 * step
     (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
-    moved, there = at(sigma, replace(curve, loose=COARSE))
+    moved, there = at(sigma, curve.coarse())
     here, _ = at(sigma)
     shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
     value, period = rounding_of(located) + np.abs(there - located) + np.abs(shift)

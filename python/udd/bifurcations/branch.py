@@ -20,7 +20,6 @@ from udd.models import Model
 
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
-from .orbit_geometry import crossings_of, extremes_of
 from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
 from .solution_curve import HELD
@@ -98,7 +97,7 @@ class BifurcationPoint(Drawable):
     def lyapunov_error(self) -> float:
         """A bound of the error of the first Lyapunov coefficient; NaN of what is no Hopf bifurcation."""
         curve, place = self._curve, self._place
-        if self.kind != "Hopf" or not isinstance(curve, EquilibriumCurve) or place is None:
+        if self.kind != "Hopf" or curve is None or place is None:
             return float("nan")
         return curve.lyapunov_error(place, self.error)
 
@@ -173,7 +172,7 @@ class Branch(Drawable):
     @cached_property
     def extremes(self) -> tuple[Floats, Floats]:
         """The least and the largest value of each component on each orbit, two arrays of shape (n, dim)."""
-        pairs = [extremes_of(curve, place.u) for curve, place in self._places]
+        pairs = [curve.extremes(place.u) for curve, place in self._places]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
     @checked_arguments
@@ -194,7 +193,9 @@ class Branch(Drawable):
         states : ndarray, shape (k, dim)
             The states there; of cycles that are not symmetric those of the mirror image are not among them.
         """
-        return crossings_of(self, section, direction)
+        each = [curve.crossings(place.u, section, direction) for curve, place in self._places]
+        which = np.repeat(np.arange(len(each)), [len(states) for states in each])
+        return which, np.concatenate([np.zeros((0, self.states.shape[1])), *each])
 
     @checked_arguments
     def solution(self, i: int) -> Equilibrium | PeriodicOrbit:

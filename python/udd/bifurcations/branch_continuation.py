@@ -152,8 +152,7 @@ def continuation(
         raise ModelError(
             f"the start, at {parameter} = {value:.6g}, lies outside the bounds {low:g} to {high:g}"
         )
-    own = curve.span(place.u) if isinstance(curve, PeriodicOrbitCurve) else 0.0
-    limit = max(40.0 * curve.flow.clock, 8.0 * own)
+    limit = max(40.0 * curve.flow.clock, 8.0 * curve.span(place.u))
     limit = limit if max_period is None else number("max_period", max_period, above=0.0)
     wanted = _wanted(until)
     limits = ContinuationLimits(low, high, ds, ds_max, whole("max_points", max_points, 1), limit, wanted)
@@ -187,16 +186,10 @@ def unit_of(value: float, low: float, high: float) -> float:
 def in_unit_of(point: BifurcationPoint, low: float, high: float) -> BifurcationPoint:
     """Return the point with its parameter in the unit of these bounds, unless they are infinite."""
     curve, place = point._curve, point._place
-    if curve is None or place is None or isinstance(curve, FamilyCurve) or not np.isfinite(high - low):
+    if curve is None or place is None or not np.isfinite(high - low):
         return point
-    scale = unit_of(point.value, low, high)
-    factor = np.append(np.ones(len(place.u) - 1), curve.scale / scale)
-    along = place.tangent * factor
-    return replace(
-        point,
-        _curve=replace(curve, scale=scale),
-        _place=CurvePoint(place.u * factor, along / np.linalg.norm(along)),
-    )
+    curve, place = curve.in_unit(place, unit_of(point.value, low, high))
+    return replace(point, _curve=curve, _place=place)
 
 
 def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[[BifurcationPoint], bool]:

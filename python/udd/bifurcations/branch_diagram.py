@@ -19,6 +19,7 @@ from udd.models import Model
 
 from .branch import BifurcationPoint, Branch
 from .branch_continuation import continuation
+from .branch_switching import BIRTHS
 from .equilibrium_search import equilibria
 from .error_bounds import rounding_of
 from .flow_map import Floats
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["Diagram", "diagram"]
 
 _ALIKE = 1e-6  # relative difference of the periods and largest multipliers of one cycle found twice
-_BORN = ("Hopf", "symmetry breaking", "period doubling", "branch point")
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,7 @@ def descendants(
     waiting = [(point, 1) for branch in family for point in branch.points]
     while waiting:
         point, generation = waiting.pop(0)
-        if point.kind not in _BORN or generation > generations:
+        if point.kind not in BIRTHS or generation > generations:
             continue
         begun(point)
         try:

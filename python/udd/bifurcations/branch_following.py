@@ -15,12 +15,9 @@ from udd.errors import IntegrationError
 from .bifurcation_functions import FUNCTIONS, TestFunctions
 from .bifurcation_location import bifurcations_between, location_error, pitchfork_at, point_at
 from .branch import AnyCurve, BifurcationPoint
-from .branch_ends import closes, hopf_end, origin_of, size_of, vanishing_part
-from .conservative_families import FamilyCurve
-from .equilibrium_curve import EquilibriumCurve
+from .branch_ends import hopf_end, origin_of
 from .error_bounds import rounding_of
 from .flow_map import Floats
-from .nonsmooth import corner_ahead
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
@@ -30,7 +27,6 @@ from .pseudo_arclength import (
     predictor_corrector_step,
     tangent_at,
 )
-from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["CLOSED", "BranchTrace", "ContinuationLimits", "Station", "follow_branch"]
 
@@ -89,11 +85,10 @@ def follow_branch(curve: AnyCurve, start: CurvePoint, limits: ContinuationLimits
         if len(way.places) > limits.most:
             way.end = "as many points as were wanted"
             break
-        if isinstance(here.curve, EquilibriumCurve):
-            corner = corner_ahead(here.curve, here.place, step)
-            if corner is not None:
-                here, step = way.round_corner(here, corner), min(step, limits.step)
-                continue
+        corner = here.curve.corner_ahead(here.place, step)
+        if corner is not None:
+            here, step = way.round_corner(here, corner), min(step, limits.step)
+            continue
         here, step = way.step_from(here, step)
     return way
 
@@ -111,18 +106,17 @@ class _Way(BranchTrace):
             there, gone, step = predictor_corrector_step(curve, place, step, limits.longest)
             after = curve.test_functions(there)
         except (CorrectorFailed, IntegrationError) as error:
-            small = isinstance(curve, PeriodicOrbitCurve) and size_of(curve, place.u) < _SMALL
-            if not small or not self.ends_at_hopf(here, 0.0):
+            if curve.size(place.u) >= _SMALL or not self.ends_at_hopf(here, 0.0):
                 self.end = f"lost: {error}"
             return here, step
-        part = vanishing_part(curve, place.u, there.u)
+        part = curve.vanishing_part(place.u, there.u)
         if part is not None and self.ends_at_hopf(here, part * gone):
             return here, step
         self.locate(here, gone, after)
         if self.end or self.leaves_bounds(here, gone, there.u):
             return here, step
-        arclength = here.arclength + gone
-        if len(self.places) > _LOOP and closes(self.places[0][:2], curve, place, there, gone):
+        arclength, first = here.arclength + gone, self.places[0]
+        if len(self.places) > _LOOP and first.curve.closes(first.place, curve, place, there, gone):
             self.places.append(Station(curve, there, after, arclength))
             self.points, self.end = _once(self.points), CLOSED
             return here, step
@@ -131,7 +125,7 @@ class _Way(BranchTrace):
             self.end = f"the period exceeds {limits.period:.6g}"
             return here, step
         curve, there = curve.prepared(there)
-        if not isinstance(curve, FamilyCurve):
+        if not curve.family:
             after = replace(after, fold=float(there.tangent[-1]))
         self.places.append(Station(curve, there, after, arclength))
         if (value := _connection(self)) is not None:
@@ -156,8 +150,6 @@ class _Way(BranchTrace):
     def ends_at_hopf(self, here: Station, distance: float) -> bool:
         """Note the Hopf point to which cycles shrink at a distance from `here`; return True if it exists."""
         curve, limits = here.curve, self.limits
-        if not isinstance(curve, PeriodicOrbitCurve) or isinstance(curve, FamilyCurve):
-            return False
         try:
             point = hopf_end(curve, here.place.u)
         except (CorrectorFailed, IntegrationError):
@@ -168,7 +160,7 @@ class _Way(BranchTrace):
             gone = _BEFORE * distance
             tangent = here.place.tangent
             last = corrected_point(curve, here.place.u + gone * tangent, tangent)
-            if gone > 0.0 and vanishing_part(curve, here.place.u, last.u) is None:
+            if gone > 0.0 and curve.vanishing_part(here.place.u, last.u) is None:
                 after = curve.test_functions(last)
                 self.locate(here, gone, after)
                 if self.end:
@@ -187,13 +179,13 @@ class _Way(BranchTrace):
         """Note the bifurcation at which a side branch turns: it ends there."""
         curve = here.curve
         there = Station(curve, place, signs, here.arclength + sigma)
-        if isinstance(curve, FamilyCurve):
+        if curve.family:
             self.places.append(there)
-            size = size_of(curve, place.u) / size_of(curve, here.place.u)
+            size = curve.size(place.u) / curve.size(here.place.u)
             what = "an equilibrium" if size < _SHRUNK else "a branch point"
             self.end = f"{what} near {curve.value(place.u):.5g}"
             return
-        point = origin_of(curve, place.u, gone) if isinstance(curve, PeriodicOrbitCurve) else None
+        point = origin_of(curve, place.u, gone)
         if point is not None:
             self.places.append(there)
             self.points.append(replace(point, arclength=there.arclength))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -10,13 +11,12 @@ from udd.errors import IntegrationError, ModelError
 
 from .bifurcation_location import changes
 from .branch import AnyCurve, BifurcationPoint
-from .conservative_families import FamilyCurve
 from .equilibrium_curve import EquilibriumCurve, expansion
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["born_at", "doubled"]
+__all__ = ["BIRTHS", "born_at", "doubled"]
 
 _HALVINGS = 24
 _BENT = 1.5  # Largest difference from 4 of the ratio of distances at an amplitude and at half of it.
@@ -38,17 +38,10 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
     curve, place = point._curve, point._place
     if curve is None or place is None:
         raise ModelError("this bifurcation point was not made by udd.continuation")
-    if point.kind in ("period doubling", "symmetry breaking") and isinstance(curve, PeriodicOrbitCurve):
-        made: tuple[AnyCurve, Floats, Floats] = doubled(curve, place)
-    elif point.kind == "Hopf" and isinstance(curve, EquilibriumCurve):
-        made = _from_rest(curve, place)
-    elif point.kind == "branch point":
-        made = _crossing(curve, place)
-    else:
+    if point.kind not in BIRTHS:
         raise ModelError(f"no branch is born at a {point.kind}: the branch itself goes on")
-    new, base, row = made
-    # Over the period a family of two rounds begins at twice the value.
-    begins = new.value(base) if isinstance(new, FamilyCurve) else point.value
+    new, base, row = BIRTHS[point.kind](curve, place)
+    begins = new.value(base)  # over the period a family of two rounds begins at twice the value
 
     def at(size: float) -> CurvePoint | None:
         try:
@@ -100,26 +93,16 @@ def _nothing_between(
 
 def doubled(curve: PeriodicOrbitCurve, place: CurvePoint) -> tuple[PeriodicOrbitCurve, Floats, Floats]:
     """Twice the time, and the direction in which the two rounds differ."""
-    u, m = place.u, curve.pieces
+    u = place.u
     values, vectors = np.linalg.eig(curve.monodromy(u))
     k = int(np.argmin(np.abs(values + 1.0)))
     along = vectors[:, k].real
-    nodes = curve.nodes(u)
     moves = [along]
     for matrix in curve.flight(u).by_state[:-1]:
         moves.append(matrix @ moves[-1])
     first = np.array(moves)
-    rounds = np.vstack([nodes, curve.mirror * (nodes - curve.shift)])
-    away = np.vstack([first, -curve.mirror * first])
-    plain = np.ones(curve.flow.dim)
-    shift = curve.shift + curve.mirror * curve.shift
-    new = replace(curve, pieces=2 * m, mirror=plain, shift=shift, share=2.0 * curve.share)
-    base = new.pack(rounds, 2.0 * curve.span(u), curve.value(u))
-    new = new.anchored(base)
-    if isinstance(new, FamilyCurve) and isinstance(curve, FamilyCurve):
-        # Two rounds have the multiplier 1 twice here: one round separates conservation from bifurcation.
-        new.free = curve.slope(u)
-    row = new.pack(away, 0.0, 0.0)
+    new, base = curve.doubled(u)
+    row = new.pack(np.vstack([first, -curve.mirror * first]), 0.0, 0.0)
     return new, base, row / np.linalg.norm(row)
 
 
@@ -153,3 +136,12 @@ def _crossing(curve: AnyCurve, place: CurvePoint) -> tuple[AnyCurve, Floats, Flo
     rest = free - np.outer(free @ known, known)
     row = rest[np.argmax(np.linalg.norm(rest, axis=1))]
     return curve.anchored(place.u), place.u, row / np.linalg.norm(row)
+
+
+#: What makes the curve born at a bifurcation, by its kind: the curve, the solution there, and the direction.
+BIRTHS: dict[str, Callable[[Any, CurvePoint], tuple[AnyCurve, Floats, Floats]]] = {
+    "Hopf": _from_rest,
+    "symmetry breaking": doubled,
+    "period doubling": doubled,
+    "branch point": _crossing,
+}

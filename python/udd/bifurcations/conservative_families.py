@@ -100,6 +100,8 @@ class FamilyCurve(PeriodicOrbitCurve):
         The direction of the last gap, in scaled coordinates.
     """
 
+    family = True
+
     conserved: Conserved | None = None
     free: Floats | None = None
 
@@ -128,6 +130,17 @@ class FamilyCurve(PeriodicOrbitCurve):
         curve = super().anchored(u, first)
         curve.free = curve.slope(u)
         return curve
+
+    def doubled(self, u: Floats) -> tuple[Self, Floats]:
+        """Return the curve of cycles that close after twice the time, and two rounds of this one on it."""
+        new, base = super().doubled(u)
+        # Two rounds have the multiplier 1 twice here: one round separates conservation from bifurcation.
+        new.free = self.slope(u)
+        return new, base
+
+    def in_unit(self, place: CurvePoint, scale: float) -> tuple[Self, CurvePoint]:
+        """Return the curve and the place as they are: their unit is that of the period or of the quantity."""
+        return self, place
 
     def is_in_a_family(self, u: Floats) -> bool:
         """Return False: the period or the conserved quantity singles the cycle out."""

@@ -15,7 +15,7 @@ from .branch_continuation import continuation
 from .connecting_orbits import Connection, connection
 from .locus_points import LocusPoint
 from .pseudo_arclength import CorrectorFailed
-from .solution_surface import SolutionSurface, SurfacePoint
+from .solution_surface import SurfacePoint
 
 __all__ = ["fold_of_cycles_at", "homoclinic_at"]
 
@@ -81,13 +81,13 @@ def _hopf_points(point: LocusPoint) -> list[BifurcationPoint]:
         for sign in (1.0, -1.0):
             try:
                 there = surface.zero(place, place.v + sign * step * along, normal, name, step)
-                points += _as_hopf(surface, there)
+                points += _as_hopf(there)
             except (CorrectorFailed, IntegrationError):
                 continue
     return points
 
 
-def _as_hopf(surface: SolutionSurface, there: SurfacePoint) -> list[BifurcationPoint]:
+def _as_hopf(there: SurfacePoint) -> list[BifurcationPoint]:
     """Return the point as one of its branch over the first parameter; None without a complex pair."""
     signs = there.functions
     pair = signs.pair

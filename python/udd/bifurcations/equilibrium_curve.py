@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from udd import _core
 from .bifurcation_functions import STILL, TURNING, TestFunctions
 from .error_bounds import rounding_of, scatter
 from .flow_map import Floats, FlowMap
-from .normal_forms import first_lyapunov_coefficient
+from .nonsmooth import corner_ahead
+from .normal_forms import Derivatives, first_lyapunov_coefficient
 from .pseudo_arclength import CurvePoint, newton_corrector
 from .solution_curve import SolutionCurve
 from .solutions import Equilibrium, kind_of_rest
@@ -65,6 +67,12 @@ def equilibrium_at(flow: FlowMap, values: Floats, x: Floats) -> Equilibrium:
     return Equilibrium(model, flow.full(x), eigenvalues, kind_of_rest(eigenvalues), residual, coefficient)
 
 
+def derivatives_at(flow: FlowMap, values: Floats, x: Floats) -> Derivatives:
+    """Return the derivatives of the rates at a reduced state up to the third."""
+    here = expansion(flow, values, x, higher=True)
+    return Derivatives(here.by_state, here.second, here.third)
+
+
 @dataclass(eq=False)
 class EquilibriumCurve(SolutionCurve):
     """Scaled equilibria and the parameter: ``u = (x / size, parameter / scale)``."""
@@ -99,7 +107,7 @@ class EquilibriumCurve(SolutionCurve):
         by_value = here.by_parameter[self.parameter] * self._rates * self.scale
         return here.rate * self._rates, np.column_stack([by_state, by_value])
 
-    kind = "equilibrium"
+    kind: ClassVar[Literal["equilibrium"]] = "equilibrium"
 
     def solution(self, u: Floats) -> Equilibrium:
         """Return the equilibrium with these unknowns."""
@@ -115,6 +123,19 @@ class EquilibriumCurve(SolutionCurve):
         noise, fitted = scatter(near, np.array([self.solution(u).lyapunov_coefficient for u in points]), 2)
         off = error / max(abs(float(place.tangent[-1])) * self.scale, 1e-300) / _NEAR
         return 2.0 * (float(noise) + abs(float(fitted[1])) * off) + float(rounding_of(fitted[2]))
+
+    def normal_form(self, u: Floats) -> Derivatives:
+        """Return the derivatives of which normal forms are made."""
+        return derivatives_at(self.flow, self.values_at(u), self.state(u))
+
+    def corner_ahead(self, here: CurvePoint, step: float) -> tuple[CurvePoint, CurvePoint] | None:
+        """Return the corner within the next step with the tangents that arrive there and leave it."""
+        return corner_ahead(self, here, step)
+
+    def extremes(self, u: Floats) -> tuple[Floats, Floats]:
+        """Return the least and the largest values of the components: twice the equilibrium."""
+        state = self.first_state(u)
+        return state, state
 
     def first_state(self, u: Floats) -> Floats:
         """Return the equilibrium as a state (dim,) of the model."""

@@ -10,8 +10,8 @@ import numpy as np
 from udd.errors import IntegrationError
 
 from .connecting_orbits import Connection
-from .equilibrium_curve import EquilibriumCurve, expansion
-from .error_bounds import COARSE, rounding_of, scatter
+from .equilibrium_curve import EquilibriumCurve, derivatives_at
+from .error_bounds import rounding_of, scatter
 from .flow_map import Floats
 from .normal_forms import (
     Derivatives,
@@ -22,7 +22,6 @@ from .normal_forms import (
     zero_hopf_coefficients,
 )
 from .pseudo_arclength import CorrectorFailed, zero_between
-from .shooting_curve import PeriodicOrbitCurve
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
 
@@ -33,6 +32,24 @@ _ZERO = 1e-3  # Size of a function at its zero, relative to its values before an
 _SAMPLES = 8  # Points about a special one, in which rounding shows.
 _ASIDE = 1e-3  # Their distance, in lengths of the segment.
 _SURE = 2.0  # Ratio of the bound to the largest scatter.
+
+#: Functions whose zeros are special points, by the kind of the curve.
+_WATCHED = {
+    "fold": ("bend", "complex_pair", "period_doubling"),
+    "Hopf": ("unit_multiplier", "lyapunov"),
+    "Neimark-Sacker": ("unit_multiplier", "period_doubling"),
+}
+
+#: Kinds of special points of cycles with two multipliers 1 or -1, and with one and a pair on the unit circle.
+_DOUBLE = {1.0: "1:1 resonance", -1.0: "1:2 resonance"}
+_WITH_PAIR = {1.0: "fold-Neimark-Sacker", -1.0: "flip-Neimark-Sacker"}
+
+#: Names of the normal form's coefficients and their formula, by the kind of the special point.
+_NORMAL_FORMS: dict[str, tuple[tuple[str, ...], Callable[[Derivatives], float | tuple[float, float]]]] = {
+    "cusp": (("c",), cusp_coefficient),
+    "Bogdanov-Takens": (("a", "b"), bogdanov_takens_coefficients),
+    "zero-Hopf": (("s", "theta"), zero_hopf_coefficients),
+}
 
 #: Kinds at which a curve ends: beyond, its points are no bifurcations of its kind.
 ENDS = {"Hopf": ("Bogdanov-Takens",), "Neimark-Sacker": ("1:1 resonance", "1:2 resonance")}
@@ -118,9 +135,8 @@ class Segment:
 
     def coarse(self) -> Segment:
         """Return the step with less accurate runs."""
-        curve, surface = self.surface.curve, self.surface
-        assert isinstance(curve, PeriodicOrbitCurve)
-        return replace(self, surface=replace(surface, curve=replace(curve, loose=COARSE)))
+        coarse = replace(self.surface, curve=self.surface.curve.coarse())
+        return replace(self, surface=coarse)
 
     def at(self, part: float) -> SurfacePoint:
         """Return the point of the curve at a part of the way."""
@@ -140,59 +156,41 @@ class Segment:
         return zero_between(value, 1.0)
 
 
-def watched_functions(
-    kind: str, surface: SolutionSurface, point: SurfacePoint, slope: Floats
-) -> dict[str, float]:
+def watched_functions(kind: str, point: SurfacePoint, slope: Floats) -> dict[str, float]:
     """Return the functions whose zeros are special points, by name; `slope` is that of its function."""
-    signs = point.functions
-    if kind == "fold":
-        functions = {
-            "bend": slope[0],
-            "complex_pair": signs.complex_pair,
-            "period_doubling": signs.period_doubling,
-        }
-    elif kind == "Hopf":
-        functions = {"unit_multiplier": signs.unit_multiplier, "lyapunov": _first_lyapunov(point)}
-    elif kind == "Neimark-Sacker":
-        functions = {"unit_multiplier": signs.unit_multiplier, "period_doubling": signs.period_doubling}
-    else:
-        functions = {"unit_multiplier": signs.unit_multiplier, "complex_pair": signs.complex_pair}
-    return functions
+    signs, values = point.functions, {}
+    for name in _WATCHED.get(kind, ("unit_multiplier", "complex_pair")):
+        if name == "lyapunov":
+            at = point.curve.normal_form(point.v[:-1])
+            values[name] = (
+                float("nan") if at is None else first_lyapunov_coefficient(at.by_state, at.second, at.third)
+            )
+        else:
+            values[name] = float(slope[0]) if name == "bend" else getattr(signs, name)
+    return values
 
 
 def _function(kind: str, name: str, segment: Segment) -> Callable[[SurfacePoint], float]:
+    """Return the function of this name at a point of a segment."""
+
     def value(point: SurfacePoint) -> float:
         if name != "bend":
-            return watched_functions(kind, segment.surface, point, np.zeros(2))[name]
-        if isinstance(point.curve, EquilibriumCurve):
-            return _bend(point)
-        return float(segment.surface.slope(point, segment.name)[0])
+            return watched_functions(kind, point, np.zeros(2))[name]
+        at = point.curve.normal_form(point.v[:-1])
+        return float(segment.surface.slope(point, segment.name)[0]) if at is None else _bend(point, at)
 
     return value
 
 
-def _bend(point: SurfacePoint) -> float:
-    """Return the rate of change of the first parameter's slope along a branch at its fold."""
+def _bend(point: SurfacePoint, at: Derivatives) -> float:
+    """Return the rate of change of the first parameter's slope along a branch of equilibria at its fold."""
     curve, place = point.curve, point.place
-    assert isinstance(curve, EquilibriumCurve)
-    at, size = _derivatives(curve, place.u), curve.flow.size
+    assert curve.kind == "equilibrium"
+    size = curve.flow.size
     along = place.tangent[:-1] * size
     left = np.linalg.svd(at.by_state / size[:, None] * size)[0][:, -1]
     by_value = curve.at(place.u).by_parameter[curve.parameter] * curve.scale
     return -float(left @ (at.b(along, along) / size)) / float(left @ (by_value / size))
-
-
-def _derivatives(curve: EquilibriumCurve, u: Floats) -> Derivatives:
-    found = expansion(curve.flow, curve.values_at(u), curve.state(u), higher=True)
-    return Derivatives(found.by_state, found.second, found.third)
-
-
-def _first_lyapunov(point: SurfacePoint) -> float:
-    curve = point.curve
-    if not isinstance(curve, EquilibriumCurve):
-        return float("nan")
-    at = _derivatives(curve, point.v[:-1])
-    return first_lyapunov_coefficient(at.by_state, at.second, at.third)
 
 
 def points_between(
@@ -221,51 +219,50 @@ def _named(kind: str, name: str, point: SurfacePoint) -> str:
     """Return the kind of the special point at which a function is zero; "" where nothing bifurcates."""
     if name in ("bend", "lyapunov"):
         return "cusp" if name == "bend" else "Bautin"
-    values, clock = point.functions.values, point.curve.flow.clock
-    if isinstance(point.curve, EquilibriumCurve):
-        others = np.delete(values, np.argmin(np.abs(values))) * clock
-        if np.abs(others).min(initial=np.inf) < _NEAR:
-            return "Bogdanov-Takens"
-        pair = others[np.abs(others.imag) > _NEAR]
-        return "zero-Hopf" if len(pair) and np.abs(pair.real).min() < _NEAR else ""
-    number = -1.0 if kind in ("period doubling", "symmetry breaking") else 1.0
+    values = point.functions.values
+    if point.curve.kind == "equilibrium":
+        return _of_eigenvalues(values * point.curve.flow.clock)
+    return _of_multipliers(kind, name, values)
+
+
+def _of_eigenvalues(values: np.ndarray) -> str:
+    others = np.delete(values, np.argmin(np.abs(values)))
+    if np.abs(others).min(initial=np.inf) < _NEAR:
+        return "Bogdanov-Takens"
+    pair = others[np.abs(others.imag) > _NEAR]
+    return "zero-Hopf" if len(pair) and np.abs(pair.real).min() < _NEAR else ""
+
+
+def _of_multipliers(kind: str, name: str, values: np.ndarray) -> str:
     if kind == "Neimark-Sacker":
         number = 1.0 if name == "unit_multiplier" else -1.0
-        pair = values[np.abs(values.imag) > 0.0]
-        real = values[np.abs(values.imag) == 0.0]
-        if np.abs(real - number).min(initial=np.inf) < np.abs(pair - number).min(initial=np.inf):
-            return "fold-Neimark-Sacker" if number > 0.0 else "flip-Neimark-Sacker"
-        return "1:1 resonance" if number > 0.0 else "1:2 resonance"
+        real = np.abs(values.imag) == 0.0
+        single, pair = (np.abs(values[mask] - number).min(initial=np.inf) for mask in (real, ~real))
+        return (_WITH_PAIR if single < pair else _DOUBLE)[number]
     if name in ("period_doubling", "unit_multiplier"):
         return "fold-flip"
+    number = -1.0 if kind in ("period doubling", "symmetry breaking") else 1.0
     others = np.delete(values, np.argmin(np.abs(values - number)))
     if np.abs(others - number).min(initial=np.inf) < _NEAR**0.5:
-        return "1:1 resonance" if number > 0.0 else "1:2 resonance"
-    pair = others[np.abs(others.imag) > _NEAR]
-    if len(pair) and np.abs(np.abs(pair) - 1.0).min() < _NEAR:
-        return "fold-Neimark-Sacker" if number > 0.0 else "flip-Neimark-Sacker"
-    return ""
+        return _DOUBLE[number]
+    turning = others[np.abs(others.imag) > _NEAR]
+    return _WITH_PAIR[number] if len(turning) and np.abs(np.abs(turning) - 1.0).min() < _NEAR else ""
+
+
+def _second_lyapunov(curve: EquilibriumCurve, u: Floats) -> float:
+    flow, values = curve.flow, curve.values_at(u)
+    return second_lyapunov_coefficient(lambda x: derivatives_at(flow, values, x), curve.state(u), flow.size)
 
 
 def _coefficients(kind: str, point: SurfacePoint) -> dict[str, float]:
     """Return the normal form's coefficients."""
     curve, u = point.curve, point.v[:-1]
-    if not isinstance(curve, EquilibriumCurve):
+    if curve.kind != "equilibrium":
         return {}
-    at = _derivatives(curve, u)
-    if kind == "cusp":
-        return {"c": cusp_coefficient(at)}
-    if kind == "Bogdanov-Takens":
-        return dict(zip("ab", bogdanov_takens_coefficients(at), strict=True))
-    if kind == "zero-Hopf":
-        return dict(zip(("s", "theta"), zero_hopf_coefficients(at), strict=True))
-    flow, values = curve.flow, curve.values_at(u)
-
-    def derivatives(x: Floats) -> Derivatives:
-        found = expansion(flow, values, x, higher=True)
-        return Derivatives(found.by_state, found.second, found.third)
-
-    return {"l2": second_lyapunov_coefficient(derivatives, curve.state(u), flow.size)}
+    if kind == "Bautin":
+        return {"l2": _second_lyapunov(curve, u)}
+    names, formula = _NORMAL_FORMS[kind]
+    return dict(zip(names, np.atleast_1d(formula(curve.normal_form(u))).tolist(), strict=True))
 
 
 def _point(
@@ -298,7 +295,7 @@ def _scatter(kind: str, segment: Segment, part: float, function: Callable[[Surfa
     near = np.linspace(-1.0, 1.0, _SAMPLES)
     noise, fitted = scatter(near, np.array([seen(part + _ASIDE * x) for x in near]), 3)
     gap, slope = noise[0], np.abs(fitted[2])
-    if isinstance(segment.surface.curve, PeriodicOrbitCurve):
+    if segment.surface.curve.kind == "cycle":
         moved = np.abs(np.array(seen(part, segment.coarse())) - seen(part))
         gap, noise = gap + moved[0], noise + moved
     off = gap / slope[0] if slope[0] > gap else np.nan

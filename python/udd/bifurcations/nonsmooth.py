@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point
+
+if TYPE_CHECKING:
+    from .equilibrium_curve import EquilibriumCurve
 
 __all__ = ["corner_ahead"]
 

@@ -6,22 +6,20 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from udd import _core
 from udd.errors import IncompleteWarning, ModelError
 from udd.simulation.batch import Batch
 from udd.simulation.trajectory import simulate
 
-from .equilibrium_curve import EquilibriumCurve, expansion
+from .equilibrium_curve import expansion
 from .floquet_multipliers import multipliers_at
 from .flow_map import Floats
-from .shooting_curve import PeriodicOrbitCurve
 
 if TYPE_CHECKING:
-    from .branch import Branch
+    from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["as_liouville", "crossings_of", "extremes_of", "orbit_states"]
+__all__ = ["as_liouville", "crossings_of", "distance_of_nodes", "extremes_of", "orbit_states"]
 
 _BETWEEN = 12  # states in a piece
 _LIOUVILLE = 1e-2  # between the logarithms of the product of all multipliers and of Liouville's formula
@@ -48,11 +46,23 @@ def orbit_states(curve: PeriodicOrbitCurve, u: Floats) -> Floats:
     return states
 
 
-def extremes_of(curve: EquilibriumCurve | PeriodicOrbitCurve, u: Floats) -> tuple[Floats, Floats]:
-    """Return the least and the largest values of a solution's components; 0 for irrelevant angles."""
-    if isinstance(curve, EquilibriumCurve):
-        state = curve.flow.full(curve.state(u))
-        return state, state
+def distance_of_nodes(first: PeriodicOrbitCurve, u: Floats, second: PeriodicOrbitCurve, v: Floats) -> float:
+    """Return the largest distance of an orbit's nodes from the polygon of the other, in typical sizes."""
+    flow = first.flow
+    around = flow.reduced(orbit_states(second, v))
+    nodes = first.around(u)
+    gaps = nodes[:, None] - around[None]
+    gaps = (gaps + flow.turns(gaps)) / flow.size
+    sides = np.roll(around, -1, axis=0) - around
+    sides = (sides + flow.turns(sides)) / flow.size
+    squared = np.maximum((sides**2).sum(axis=1), 1e-300)
+    part = np.clip((gaps * sides).sum(axis=2) / squared, 0.0, 1.0)
+    away = np.linalg.norm(gaps - part[:, :, None] * sides, axis=2)
+    return float(away.min(axis=1).max())
+
+
+def extremes_of(curve: PeriodicOrbitCurve, u: Floats) -> tuple[Floats, Floats]:
+    """Return the least and the largest values of a cycle's components; 0 for irrelevant angles."""
     states = orbit_states(curve, u)
     kept = curve.flow.kept
     low, high = np.zeros(states.shape[1]), np.zeros(states.shape[1])
@@ -70,40 +80,30 @@ def _peak(x: Floats) -> float:
     return float(top - 0.125 * (after - before) ** 2 / bend) if bend < 0.0 else float(top)
 
 
-def crossings_of(
-    branch: Branch, section: str | None, direction: str | None
-) -> tuple[NDArray[np.intp], Floats]:
-    """Places on a branch of cycles, and the states where they cross a section."""
+def crossings_of(curve: PeriodicOrbitCurve, u: Floats, section: str | None, direction: str | None) -> Floats:
+    """Return the states (k, dim) at which a cycle crosses a section."""
     from udd.chaos.poincare_sections import poincare
 
-    which, states = [], []
-    for i, (curve, place) in enumerate(branch._places):
-        if not isinstance(curve, PeriodicOrbitCurve):
-            raise ModelError("equilibria do not cross a section")
-        flow, u = curve.flow, place.u
-        if flow.forcing is not None:
-            raise ModelError("a forced cycle's section is its state at the forcing's phase 0: Branch.states")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing
-            crossings = poincare(
-                flow.with_values(curve.values_at(u)),
-                section,
-                4,
-                state0=flow.full(curve.around(u)),
-                direction=direction,
-                transient=0,
-                t_max=curve.span(u) / curve.pieces,
-                rtol=1e-10,
-                atol=1e-13,
-                threads=1,
-                progress=False,
-            )
-        real = np.isfinite(crossings.t)
-        own = crossings.state[real]
-        which += [i] * len(own)
-        states += [*own]
-    dim = len(branch.model.state_names)
-    return np.array(which, dtype=np.intp), np.array(states).reshape(-1, dim)
+    flow = curve.flow
+    if flow.forcing is not None:
+        raise ModelError("a forced cycle's section is its state at the forcing's phase 0: Branch.states")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing
+        crossings = poincare(
+            flow.with_values(curve.values_at(u)),
+            section,
+            4,
+            state0=flow.full(curve.around(u)),
+            direction=direction,
+            transient=0,
+            t_max=curve.span(u) / curve.pieces,
+            rtol=1e-10,
+            atol=1e-13,
+            threads=1,
+            progress=False,
+        )
+    states: Floats = crossings.state[np.isfinite(crossings.t)]
+    return states
 
 
 def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:

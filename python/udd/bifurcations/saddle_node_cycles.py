@@ -9,7 +9,6 @@ from udd.errors import IntegrationError
 
 from .bifurcation_location import nearest_bifurcation
 from .branch import BifurcationPoint, Branch
-from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed
 from .shooting_curve import PeriodicOrbitCurve
@@ -46,7 +45,7 @@ def saddle_node_on(branch: Branch) -> BifurcationPoint | None:
 def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
     """Return the fold of equilibria near the slowest node of a cycle."""
     flow, slow = curve.flow, curve.nodes(u)[int(np.argmin(curve.speeds(u)))]
-    rests = EquilibriumCurve(flow, curve.values, curve.parameter, curve.scale)
+    rests, begin = curve.rests_near(slow, u)
 
     def equations(y: Floats) -> Floats:
         residual, matrix = rests.equations(y)
@@ -54,7 +53,7 @@ def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
         return np.append(residual, np.linalg.det(matrix[:, :-1]))
 
     try:
-        found = optimize.root(equations, rests.pack(slow, curve.value(u)))
+        found = optimize.root(equations, begin)
         guess = found.x
         if not found.success or np.linalg.norm(rests.state(guess) / flow.size - slow / flow.size) > _NEAR:
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -13,9 +13,11 @@ from udd.errors import IntegrationError
 
 from .bifurcation_functions import STILL, TURNING, TestFunctions, product_less
 from .condensation import CyclicEquations
+from .equilibrium_curve import EquilibriumCurve
 from .error_bounds import COARSE, rounding_of
 from .floquet_multipliers import Multipliers, multipliers_at
 from .flow_map import Floats, SegmentEnds
+from .orbit_geometry import as_liouville, crossings_of, distance_of_nodes, extremes_of
 from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
 from .solution_curve import HELD, SolutionCurve
 from .solutions import PeriodicOrbit
@@ -23,6 +25,7 @@ from .solutions import PeriodicOrbit
 __all__ = ["PeriodicOrbitCurve"]
 
 _DENSE = 61  # equations up to which a dense matrix is as fast
+_COLLAPSED = 0.02  # Size relative to that before, below which an orbit is an equilibrium.
 _EXACT = 1e-11  # a singular value below this part of the largest is zero but for rounding
 
 
@@ -235,7 +238,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         factors: Floats = np.swapaxes(after, 1, 2) @ scaled @ before
         return np.ascontiguousarray(factors)
 
-    kind = "cycle"
+    kind: ClassVar[Literal["cycle"]] = "cycle"
 
     def solution(self, u: Floats) -> PeriodicOrbit:
         """Return the cycle with these unknowns."""
@@ -263,7 +266,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         """
         if self.is_in_a_family(u):
             return float("nan")
-        period, coarse = self.period(u), replace(self, loose=COARSE)
+        period, coarse = self.period(u), self.coarse()
         try:
             moved = coarse.period(newton_corrector(coarse, u, natural_constraint(u)))
         except (CorrectorFailed, IntegrationError):
@@ -287,6 +290,75 @@ class PeriodicOrbitCurve(SolutionCurve):
             return False
         _, sizes = self.kept_quantities(u)
         return bool(sizes[-1] < _EXACT * sizes[0])
+
+    def _shape(self, u: Floats) -> Floats:
+        """Return the scaled distances (m, r) of the nodes from their centre."""
+        scaled = self.around(u) / self.flow.size
+        shape: Floats = (scaled - scaled.mean(axis=0))[: self.pieces]
+        return shape
+
+    def size(self, u: Floats) -> float:
+        """Return the root mean square of an orbit's distance from its centre, in typical sizes."""
+        return float(np.linalg.norm(self._shape(u))) / float(np.sqrt(self.pieces))
+
+    def vanishing_part(self, a: Floats, b: Floats) -> float | None:
+        """Return the part of a step after which the orbit has no size; None if it keeps one.
+
+        Beyond a Hopf point the branch returns on the mirrored amplitude: the same cycles half a period later.
+        """
+        before, after = self._shape(a), self._shape(b)
+        first = float(np.linalg.norm(before))
+        last = float((before * after).sum()) / first if first else 0.0
+        return first / (first - last) if first > 0.0 and last <= _COLLAPSED * first else None
+
+    def coarse(self) -> Self:
+        """Return the curve with less accurate runs."""
+        return replace(self, loose=COARSE)
+
+    def closes(self, start: CurvePoint, curve: Any, here: CurvePoint, there: CurvePoint, step: float) -> bool:
+        """Return True if a branch passes its start on this curve between two points that lie `step` apart.
+
+        Cycles are compared without regard to where on them the first node lies.
+        """
+        # Period and parameter; then the orbits themselves.
+        first, along = self._numbers(start.u), start.tangent[-2:]
+        before, after = curve._numbers(here.u), curve._numbers(there.u)
+        if not (before - first) @ along < 0.0 <= (after - first) @ along:
+            return False
+        if np.linalg.norm(after - first) > 1.5 * step or there.tangent[-2:] @ along <= 0.0:
+            return False
+        return distance_of_nodes(self, start.u, curve, there.u) < 1.5 * step
+
+    def _numbers(self, u: Floats) -> Floats:
+        """Return the scaled time and parameter."""
+        return np.array([self.span(u) / self.clock, u[-1]])
+
+    def follows_liouville(self, u: Floats) -> bool:
+        """Return True if the multipliers agree with the divergence along the orbit."""
+        return as_liouville(self, u)
+
+    def crossings(self, u: Floats, section: str | None, direction: str | None) -> Floats:
+        """Return the states (k, dim) at which a cycle crosses a section."""
+        return crossings_of(self, u, section, direction)
+
+    def extremes(self, u: Floats) -> tuple[Floats, Floats]:
+        """Return the least and the largest values of the components; 0 for irrelevant angles."""
+        return extremes_of(self, u)
+
+    def doubled(self, u: Floats) -> tuple[Self, Floats]:
+        """Return the curve of cycles that close after twice the time, and two rounds of this one on it."""
+        nodes = self.nodes(u)
+        rounds = np.vstack([nodes, self.mirror * (nodes - self.shift)])
+        shift = self.shift + self.mirror * self.shift
+        plain = np.ones(self.flow.dim)
+        new = replace(self, pieces=2 * self.pieces, mirror=plain, shift=shift, share=2.0 * self.share)
+        base = new.pack(rounds, 2.0 * self.span(u), self.value(u))
+        return new.anchored(base), base
+
+    def rests_near(self, x: Floats, u: Floats) -> tuple[EquilibriumCurve, Floats]:
+        """Return the curve of equilibria over the same parameter, and a state as unknowns of it."""
+        rests = EquilibriumCurve(self.flow, self.values, self.parameter, self.scale)
+        return rests, rests.pack(x, self.value(u))
 
     def first_state(self, u: Floats) -> Floats:
         """Return the first node as a state (dim,) of the model."""

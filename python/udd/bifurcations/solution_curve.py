@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from udd.errors import ModelError
 
 from .flow_map import Floats, FlowMap
+from .normal_forms import Derivatives
 from .pseudo_arclength import CurvePoint
 
 __all__ = ["HELD", "SolutionCurve"]
@@ -28,6 +33,8 @@ class SolutionCurve:
     second : int
         The index of another parameter by which derivatives are wanted, `HELD` for none.
     """
+
+    family: ClassVar[bool] = False  # True for cycles that no parameter of the model singles out
 
     flow: FlowMap
     values: Floats
@@ -64,3 +71,51 @@ class SolutionCurve:
     def prepared(self, place: CurvePoint) -> tuple[Self, CurvePoint]:
         """Return the curve for the next step from a place, and the place with its tangent there."""
         return self, place
+
+    def in_unit(self, place: CurvePoint, scale: float) -> tuple[Self, CurvePoint]:
+        """Return the curve with its parameter in another unit, and the place on it."""
+        factor = np.append(np.ones(len(place.u) - 1), self.scale / scale)
+        along = place.tangent * factor
+        return replace(self, scale=scale), CurvePoint(place.u * factor, along / np.linalg.norm(along))
+
+    def coarse(self) -> Self:
+        """Return the curve with less accurate runs; that of equilibria has none."""
+        return self
+
+    def closes(self, start: CurvePoint, curve: Any, here: CurvePoint, there: CurvePoint, step: float) -> bool:
+        """Return True if a branch passes its start on this curve between two points that lie `step` apart."""
+        gaps = [(point.u - start.u) @ start.tangent for point in (here, there)]
+        near = np.linalg.norm(there.u - start.u) < 1.5 * step
+        return bool(gaps[0] < 0.0 <= gaps[1] and near and start.tangent @ there.tangent > 0.0)
+
+    def span(self, u: Floats) -> float:
+        """Return the time until the orbit closes: 0 for equilibria."""
+        return 0.0
+
+    def size(self, u: Floats) -> float:
+        """Return the root mean square of an orbit's distance from its centre; infinite for equilibria."""
+        return np.inf
+
+    def vanishing_part(self, a: Floats, b: Floats) -> float | None:
+        """Return the part of a step after which an orbit has no size; None if it keeps one."""
+        return None
+
+    def crossings(self, u: Floats, section: str | None, direction: str | None) -> Floats:
+        """Return the states (k, dim) at which a cycle crosses a section."""
+        raise ModelError("equilibria do not cross a section")
+
+    def corner_ahead(self, here: CurvePoint, step: float) -> tuple[CurvePoint, CurvePoint] | None:
+        """Return the corner within the next step with the tangents that arrive there and leave it."""
+        return None
+
+    def follows_liouville(self, u: Floats) -> bool:
+        """Return True if the multipliers agree with the divergence along the orbit; equilibria have none."""
+        return True
+
+    def lyapunov_error(self, place: CurvePoint, error: float) -> float:
+        """Return a bound of the error of the first Lyapunov coefficient; NaN for cycles, which have none."""
+        return float("nan")
+
+    def normal_form(self, u: Floats) -> Derivatives | None:
+        """Return the derivatives of which normal forms are made; None for cycles."""
+        return None

@@ -13,7 +13,6 @@ from .bifurcation_functions import TestFunctions
 from .branch import AnyCurve
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, newton, solve
-from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["SolutionSurface", "SurfacePoint"]
 
@@ -109,7 +108,7 @@ class SolutionSurface:
 
     def anchored(self, point: SurfacePoint) -> tuple[SolutionSurface, SurfacePoint]:
         """Return the surface with this solution as the reference of the phase, and the point on it."""
-        if not isinstance(self.curve, PeriodicOrbitCurve):
+        if self.curve.kind != "cycle":
             return self, point
         surface = replace(self, curve=self._curve_at(point.v).anchored(point.v[:-1]))
         return surface, surface._at(point.v, *point.plane)
