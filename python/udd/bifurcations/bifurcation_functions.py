@@ -31,6 +31,8 @@ class TestFunctions:
 
     Attributes
     ----------
+    values : ndarray of complex
+        Multipliers across the flow of the map that closes the orbit, or eigenvalues.
     fold : float
         The tangent's component along the parameter.
     unit_multiplier : float
@@ -40,21 +42,16 @@ class TestFunctions:
     complex_pair : float
         Zero where two multipliers have the product 1, or two eigenvalues the sum 0: Neimark-Sacker and Hopf
         bifurcations where they are a complex pair.
-    surfaces : ndarray
-        The functions of the law's switching surfaces, for equilibria.
     collision : float
         For families with a conserved quantity: zero where two pairs of multipliers meet, negative where they
         have left the unit circle (or the real axis) together; NaN with fewer pairs.
-    values : ndarray of complex
-        Multipliers across the flow of the map that closes the orbit, or eigenvalues.
     """
 
-    fold: float
-    unit_multiplier: float
-    period_doubling: float
-    complex_pair: float
-    surfaces: Floats
     values: np.ndarray
+    fold: float
+    unit_multiplier: float = float("nan")
+    period_doubling: float = float("nan")
+    complex_pair: float = float("nan")
     collision: float = float("nan")
 
     @property

@@ -16,6 +16,7 @@ from .equilibrium_curve import equilibrium_at
 from .equilibrium_search import refined
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats
+from .manifold_search import until_it_stands
 from .pseudo_arclength import CorrectorFailed
 from .saddle_node_cycles import saddle_node_on
 from .shooting_curve import PeriodicOrbitCurve
@@ -26,7 +27,6 @@ __all__ = ["Connection", "connection", "found_by"]
 
 _TRIED = 8  # Number of slowest nodes near which an equilibrium is looked for.
 _PROLONGED = 8  # Largest number of prolongations.
-_STANDS = 1e-13  # Relative change below which the value has converged.
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,15 +191,13 @@ def found_by(curve: ConnectingCurve, guess: Floats, parameter: str) -> Connectio
         No such orbit is near.
     """
     try:
-        curve, u = curve.solved(guess)
-        error = float("nan")
-        for _ in range(_PROLONGED):
-            before = curve.parameters(u)[0]
-            longer, u = curve.prolonged(u)
-            curve, u = longer.solved(u)
-            error = abs(curve.parameters(u)[0] - before)
-            if error < _STANDS * abs(before):
-                break
+        (curve, u), error, _ = until_it_stands(
+            curve.solved(guess),
+            lambda orbit, _, __: prolonged_and_solved(*orbit),
+            lambda orbit: float(orbit[0].parameters(orbit[1])[0]),
+            np.nan,
+            _PROLONGED,
+        )
         value = float(curve.parameters(u)[0])
         coarse, moved = replace(curve, loose=COARSE).solved(u)
         error += abs(coarse.parameters(moved)[0] - value) + float(rounding_of(value))
@@ -212,6 +210,12 @@ def found_by(curve: ConnectingCurve, guess: Floats, parameter: str) -> Connectio
     return Connection(
         kind, parameter, value, float(error), rest, t, curve.flow.full(nodes), curve.nearest(u), (curve, u)
     )
+
+
+def prolonged_and_solved(curve: ConnectingCurve, u: Floats) -> tuple[ConnectingCurve, Floats]:
+    """Return the connection as a longer orbit."""
+    longer, guess = curve.prolonged(u)
+    return longer.solved(guess)
 
 
 def through_cycle(curve: PeriodicOrbitCurve, u: Floats) -> tuple[ConnectingCurve, Floats]:

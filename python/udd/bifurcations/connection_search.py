@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -21,18 +23,15 @@ from .branch_continuation import bounds_of
 from .connecting_orbits import Connection, found_by
 from .equilibrium_search import equilibria, refined
 from .flow_map import Floats, FlowMap, flow_of
-from .invariant_manifolds import Eigendirection, direction_alone
+from .invariant_manifolds import FAR, FINE, LEAVES, Eigendirection, direction_alone
+from .manifold_search import brackets
 from .solutions import FoundList
 
 __all__ = ["Connections", "connections"]
 
-_FINE = 24  # Samples in a typical time.
 _ASIDE = 1e-3  # Distance from equilibria, in typical sizes, at which runs begin that show the extent.
-_AWAY = 1e-6  # Distance from the equilibrium, in typical sizes, within which the manifold is straight.
 _LEFT = 0.1  # Distance at which the manifold has left the equilibrium.
-_LEAVES = 80.0  # Most typical times that this takes.
 _SHOWN = 20.0  # Typical times that show the extent of the motion.
-_FAR = 30.0  # Typical sizes, beyond which nothing comes back.
 _BEND = 3.0  # Typical sizes beyond which distances count less and less.
 _APART = 0.6  # Distance up to which curves are alike.
 _NEAR = 1.0  # Largest distance of a passage.
@@ -44,7 +43,7 @@ _BESIDE = 1e3  # Widths of an interval within which two connections of one time 
 _SOONER = 0.5  # Typical times by which these times differ at most.
 _TRIES = 4  # Guesses of an equilibrium besides the first.
 _PARTS = 4  # Parts into which an interval is cut.
-_MOST = 30_000  # Largest number of curves that are compared.
+_MOST = 60_000  # Largest number of marks that are compared.
 _ROWS = 2000  # Curves that are followed together.
 _SAME = 1e-11  # Relative distance of two results for one connection.
 
@@ -76,7 +75,7 @@ class _Part:
     distance: float
 
 
-_Found = tuple[int, Connection]  # when it came near the equilibrium at its end
+_Located = tuple[int, Connection]  # when it came near the equilibrium at its end
 
 
 class Connections(FoundList[Connection]):
@@ -192,7 +191,7 @@ def connections(
 def _extent(model: Model, rests: list[Floats]) -> Floats:
     """States that show how large the motion is: of runs that leave the equilibria."""
     clock = flow_of(model, np.ones((1, len(model.state_names)))).clock
-    times = np.linspace(0.0, _SHOWN * clock, 10 * _FINE)
+    times = np.linspace(0.0, _SHOWN * clock, 10 * FINE)
     seen = [np.ones(len(model.state_names)) if not rests else rests[0]]
     for rest in rests:
         # A run that blows up may last for half of the time, or for a quarter, ...
@@ -256,14 +255,14 @@ class _Manifold:
         return found
 
     def _followed(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
-        flow, step = self.flow, self.flow.clock / _FINE
+        flow, step = self.flow, self.flow.clock / FINE
         size, count = flow.size, len(values)
         ways = [self.alone(value, rest) for value, rest in zip(values.tolist(), rests, strict=True)]
         center, left = np.array(rests), np.zeros((count, flow.dim))
         x, time = center.copy(), np.ones(count)
         for i, way in enumerate(ways):
             if way is not None:
-                x[i] += size * self.sign * _AWAY * way.vector
+                x[i] = way.start(flow, rests[i], self.sign)
                 time[i], left[i] = np.sign(way.number), way.left
         rows = np.tile(flow.values, (count, 1))
         rows[:, self.index] = values
@@ -272,7 +271,7 @@ class _Manifold:
         # Between values that are hardly apart it is seen late on which side an equilibrium is passed.
         rates = [abs(way.number) for way in ways if way is not None]
         lasts = self.longest - float(np.log(_NARROW)) / min(rates, default=1.0)
-        most = _FINE * (_LEAVES + lasts / flow.clock)
+        most = FINE * (LEAVES + lasts / flow.clock)
         require_memory("states of curves up to t_max", most, count, flow.dim, itemsize=16)
         for k in range(1, round(most)):
             rows_left = np.flatnonzero(going)
@@ -283,7 +282,7 @@ class _Manifold:
             end[rows_left] = k
             scaled = np.linalg.norm((x - center) / size, axis=1)
             away_at = np.where(going & (scaled > _LEFT), np.minimum(away_at, k), away_at)
-            going &= (scaled < _FAR) & ((k - away_at) * step < lasts)
+            going &= (scaled < FAR) & ((k - away_at) * step < lasts)
         path = np.array(states)
         return [
             _Curve(value, rests[i], left[i], path[: end[i] + 1, i], away_at[i])
@@ -303,36 +302,32 @@ class _Manifold:
 
     def connections(self, parameter: str) -> tuple[list[Connection], bool]:
         """Return those at which the curve changes its course, and True if the search is complete."""
-        values = np.array([v for v, rest in zip(self.grid, self.rests, strict=True) if rest is not None])
+        located: list[_Located] = []
         if not self.exists:
             return [], True
-        spacing = float(self.grid[1] - self.grid[0])
-        curves = self.curves(values, [rest for rest in self.rests if rest is not None])
-        # If the equilibrium was lost between two values, nothing is compared.
-        pairs = [(a, b) for a, b in pairwise(curves) if b.value - a.value < 1.5 * spacing]
-        located: list[_Found] = []
-        followed = 0
-        while pairs and followed < _MOST:
-            wide = []
-            for a, b in pairs:
-                part = self._part(a, b)
-                if part is None:
-                    continue
-                self._try(a, b, part, parameter, located)
-                if b.value - a.value > _NARROW * max(abs(a.value), abs(b.value)):
-                    wide.append((a, b))
-            cuts = [np.linspace(a.value, b.value, _PARTS + 1)[1:-1] for a, b in wide]
-            guesses = [a.rest for a, _ in wide for _ in range(_PARTS - 1)]
-            values = np.concatenate([np.zeros(0), *cuts])
-            near = [self.rest_near(v, guess) for v, guess in zip(values.tolist(), guesses, strict=True)]
-            rests = [guess if rest is None else rest for rest, guess in zip(near, guesses, strict=True)]
-            between = self.curves(values, rests)
-            followed += len(between)
-            pairs = []
-            for k, (a, b) in enumerate(wide):
-                inner = between[k * (_PARTS - 1) : (k + 1) * (_PARTS - 1)]
-                pairs += list(pairwise([a, *inner, b]))
-        return [one for _, one in located], not pairs
+        # If the equilibrium is lost between two values, nothing is compared.
+        there = [k for k, rest in enumerate(self.rests) if rest is not None]
+        marks: list[_Curve | None] = [None] * len(self.grid)
+        curves = self.curves(self.grid[there], [rest for rest in self.rests if rest is not None])
+        for k, curve in zip(there, curves, strict=True):
+            marks[k] = curve
+        compared = 0
+        while marks and compared < _MOST:
+            pairs = brackets(marks, _both_leave, partial(self._tried, parameter, located))
+            marks = self._cut(pairs)
+            compared += len(marks)
+        return [connection for _, connection in located], not marks
+
+    def _cut(self, pairs: list[tuple[_Curve, _Curve]]) -> list[_Curve | None]:
+        """Return the marks of wide intervals that are cut, with None after each."""
+        pairs = [(a, b) for a, b in pairs if b.value - a.value > _NARROW * max(abs(a.value), abs(b.value))]
+        values = np.array([np.linspace(a.value, b.value, _PARTS + 1)[1:-1] for a, b in pairs]).ravel()
+        guesses = [a.rest for a, _ in pairs for _ in range(_PARTS - 1)]
+        rests = [self.rest_near(v, guess) for v, guess in zip(values.tolist(), guesses, strict=True)]
+        curves = iter(
+            self.curves(values, [x if y is None else y for x, y in zip(guesses, rests, strict=True)])
+        )
+        return [m for a, b in pairs for m in (a, *islice(curves, _PARTS - 1), b, None)]
 
     def _part(self, a: _Curve, b: _Curve) -> _Part | None:
         """Return the passage at which two curves part; None if they stay alike."""
@@ -344,7 +339,7 @@ class _Manifold:
         if not len(apart) or not left < apart[0]:
             return None
         first, last = int(left) + 1, int(apart[0])
-        latest = left + _FINE * self.longest / flow.clock
+        latest = left + FINE * self.longest / flow.clock
         best = None
         for image, mirror in enumerate(flow.images):
             if image and np.allclose(mirror * a.rest, a.rest, atol=1e-9):
@@ -362,32 +357,29 @@ class _Manifold:
         part = best or _Part(last, last, False, np.inf)
         return part if part.came <= latest else None
 
-    def _try(self, a: _Curve, b: _Curve, part: _Part, parameter: str, located: list[_Found]) -> None:
-        """Newton's method, where two curves pass an equilibrium on its two sides."""
-        width = b.value - a.value
+    def _tried(self, parameter: str, located: list[_Located], a: _Curve, b: _Curve) -> tuple[_Curve, _Curve]:
+        """Return curves that part; add the connection between them. ModelError: they take one course."""
+        part, width = self._part(a, b), b.value - a.value
+        if part is None:
+            raise ModelError("the curves do not part")
         narrow = width < _TRIED * max(abs(a.value), abs(b.value))
-        if not (part.distance < _CLOSE or (narrow and np.isfinite(part.distance))):
-            return
-        kind = "heteroclinic" if part.image else "homoclinic"
-        beside = _BESIDE * width
-        for came, connection in located:
-            known = connection.kind == kind and abs(came - part.came) < _SOONER * _FINE
-            if known and a.value - beside <= connection.value <= b.value + beside:
-                return
-        try:
-            connection = self._solved(a, part.nearest, part.image, parameter)
-        except (ModelError, IntegrationError):
-            return
-        if (
-            not self.grid[0] <= connection.value <= self.grid[-1]
-            or abs(connection.value - a.value) > 2.0 * beside
+        tried = part.distance < _CLOSE or (narrow and np.isfinite(part.distance))
+        kind, beside = "heteroclinic" if part.image else "homoclinic", _BESIDE * width
+        if tried and not any(
+            connection.kind == kind
+            and abs(came - part.came) < _SOONER * FINE
+            and a.value - beside <= connection.value <= b.value + beside
+            for came, connection in located
         ):
-            return
-        if not any(_same(connection, other) for _, other in located):
-            located.append((part.came, connection))
+            with suppress(ModelError, IntegrationError):
+                new = self._solved(a, part.nearest, part.image, parameter)
+                inside = self.grid[0] <= new.value <= self.grid[-1]
+                if inside and abs(new.value - a.value) <= 2.0 * beside:
+                    located += [] if any(_same(new, other) for _, other in located) else [(part.came, new)]
+        return a, b
 
     def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
-        flow, step = self.flow, self.flow.clock / _FINE
+        flow, step = self.flow, self.flow.clock / FINE
         pieces = flow.pieces_for(last * step)
         every = max(1, last // pieces)
         where = np.arange(last % every, last + 1, every)
@@ -400,6 +392,11 @@ class _Manifold:
         values = self.values_at(curve.value)
         guess = ConnectingCurve.through(flow, values, self.index, rest, mirror, nodes, span)
         return found_by(*guess, parameter)
+
+
+def _both_leave(a: _Curve, b: _Curve) -> bool:
+    """Return True if two curves have left their equilibria."""
+    return max(a.left_at, b.left_at) < np.inf
 
 
 def _same(one: Connection, other: Connection) -> bool:

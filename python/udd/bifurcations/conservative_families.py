@@ -199,15 +199,14 @@ class FamilyCurve(PeriodicOrbitCurve):
 
         The fold is that of the kept quantity.
         """
-        values, nothing = multipliers.values, float("nan")
+        values = multipliers.values
         others = np.delete(np.arange(len(values)), np.argmin(np.abs(values - 1.0)))
         first = place.tangent[: self.flow.dim]
         fold = float(self.slope(place.u) @ first) * np.sqrt(self.pieces)
         plus, minus = (
             product_less(multipliers.log[others], multipliers.phases[others], unit) for unit in (1.0, -1.0)
         )
-        collision = discriminant(values[others])
-        return TestFunctions(fold, plus, minus, nothing, np.zeros(0), values, collision)
+        return TestFunctions(values, fold, plus, minus, collision=discriminant(values[others]))
 
     def kind_at(self, name: str, here: TestFunctions) -> str:
         """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""

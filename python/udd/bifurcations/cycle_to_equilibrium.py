@@ -17,20 +17,16 @@ from .branch import Branch, cycles_of
 from .equilibrium_curve import equilibrium_at
 from .equilibrium_search import refined
 from .flow_map import Floats, FlowMap
-from .invariant_manifolds import direction_alone
+from .invariant_manifolds import AWAY, FAR, FINE, LEAVES, direction_alone
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
 from .saddle_cycles import SaddleCycle, saddle_at
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["CycleConnection", "cycle_connections"]
 
-_AWAY = 1e-6  # Distance from the equilibrium, in typical sizes, within which the manifold is straight.
-_FINE = 24  # Samples in a typical time.
 _NEAR = 1.0  # Largest distance of a passage, in typical sizes.
 _PARTS = 8  # Parts of a piece of the cycle, with which the manifold is compared.
 _LEFT = 0.5  # Distance at which the manifold has left the equilibrium.
-_FAR = 30.0  # Typical sizes, beyond which nothing comes back.
-_LEAVES = 80.0  # Most typical times from the equilibrium to the cycle.
 _ONTO = 1e-4  # Largest distance from the cycle in the end, in typical sizes.
 
 
@@ -172,22 +168,22 @@ class _Search:
 
     def _passage(self, saddle: SaddleCycle) -> _Passage | None:
         """Return when the manifold first comes to the cycle, and on which side."""
-        begin = self._start(saddle.values, _AWAY)
+        begin = self._start(saddle.values, AWAY)
         if begin is None:
             return None
         start = begin[0]
         around = self.mirror * self._around(saddle)
-        step = self.time * self.flow.clock / _FINE
+        step = self.time * self.flow.clock / FINE
         last, before, left, nearest = np.inf, np.inf, False, 0
         for k, x in enumerate(self._run(saddle.values, start, step)):
             gaps = np.linalg.norm((x - around) / self.flow.size, axis=1)
             away = float(gaps.min())
-            if not away < _FAR:
+            if not away < FAR:
                 return None
             left = left or bool(np.linalg.norm((x - start) / self.flow.size) > _LEFT)
             if left and before > last < away and last < _NEAR:
                 part, t = nearest / len(around), float(k * step)
-                return _Passage(saddle, part, t, self._arrival(saddle, part, t, 0, Accuracy(_AWAY))[0])
+                return _Passage(saddle, part, t, self._arrival(saddle, part, t, 0, Accuracy(AWAY))[0])
             before, last, nearest = last, away, int(np.argmin(gaps))
         return None
 
@@ -202,9 +198,9 @@ class _Search:
 
     def _run(self, values: Floats, x: Floats, step: float) -> Iterator[Floats]:
         """Yield the states after each step of time, a typical time of them in one call."""
-        spans = np.arange(1.0, _FINE + 1.0) * step
-        for _ in range(round(_LEAVES)):
-            states = self.flow.fly_each(values, np.tile(x, (_FINE, 1)), spans)
+        spans = np.arange(1.0, FINE + 1.0) * step
+        for _ in range(LEAVES):
+            states = self.flow.fly_each(values, np.tile(x, (FINE, 1)), spans)
             yield from states
             x = states[-1]
 
@@ -216,8 +212,8 @@ class _Search:
         way = direction_alone(self.flow, values, rest, self.time)
         if way is None or way.number == 0.0:
             return None
-        x = np.asarray(rest + self.flow.size * self.sign * away * way.vector)
-        return x, float(np.log(away / _AWAY)) / way.number
+        x = way.start(self.flow, rest, self.sign, away)
+        return x, float(np.log(away / AWAY)) / way.number
 
     def _arrival(
         self, saddle: SaddleCycle, part: float, t: float, rounds: int, accuracy: Accuracy
@@ -235,7 +231,7 @@ class _Search:
 
     def _located(self, a: _Passage, b: _Passage) -> CycleConnection:
         """Return the connection between two passages, by more and more rounds about the cycle."""
-        first = Accuracy(_AWAY)
+        first = Accuracy(AWAY)
         nearer = a if abs(a.height) < abs(b.height) else b
         like, part, t = nearer.saddle, nearer.part, nearer.t
 

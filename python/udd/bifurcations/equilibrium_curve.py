@@ -13,7 +13,7 @@ from udd import _core
 from .bifurcation_functions import STILL, TURNING, TestFunctions
 from .error_bounds import rounding_of, scatter
 from .flow_map import Floats, FlowMap
-from .nonsmooth import corner_ahead
+from .nonsmooth import next_corner
 from .normal_forms import Derivatives, first_lyapunov_coefficient
 from .pseudo_arclength import CurvePoint, newton_corrector
 from .solution_curve import SolutionCurve
@@ -25,15 +25,12 @@ _SAMPLES = 12  # Equilibria about a Hopf point, in which rounding shows.
 _NEAR = 1e-5  # Their distance along the branch.
 
 
-@dataclass(frozen=True)
-class Expansion:
+@dataclass(frozen=True, eq=False)
+class Expansion(Derivatives):
     """The rates at a state, their derivatives, and the functions of the switching surfaces."""
 
     rate: Floats
-    by_state: Floats
     by_parameter: Floats
-    second: Floats
-    third: Floats
     surfaces: Floats
 
 
@@ -45,14 +42,9 @@ def expansion(flow: FlowMap, values: Floats, x: Floats, higher: bool = False, t:
     second, third = derivatives["second"], derivatives["third"]
     if higher:
         second, third = second[np.ix_(k, k, k)], third[np.ix_(k, k, k, k)]
-    by_parameter = derivatives["by_parameter"][:, k]
+    rate, by_state, by_parameter = (derivatives[name] for name in ("rate", "by_state", "by_parameter"))
     return Expansion(
-        derivatives["rate"][k],
-        derivatives["by_state"][np.ix_(k, k)],
-        by_parameter,
-        second,
-        third,
-        derivatives["surfaces"],
+        by_state[np.ix_(k, k)], second, third, rate[k], by_parameter[:, k], derivatives["surfaces"]
     )
 
 
@@ -62,15 +54,9 @@ def equilibrium_at(flow: FlowMap, values: Floats, x: Floats) -> Equilibrium:
     eigenvalues = np.linalg.eigvals(here.by_state).astype(complex)
     eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
     residual = float(np.abs(here.rate * flow.clock / flow.size).max())
-    coefficient = first_lyapunov_coefficient(here.by_state, here.second, here.third)
+    coefficient = first_lyapunov_coefficient(here)
     model = flow.with_values(values)
     return Equilibrium(model, flow.full(x), eigenvalues, kind_of_rest(eigenvalues), residual, coefficient)
-
-
-def derivatives_at(flow: FlowMap, values: Floats, x: Floats) -> Derivatives:
-    """Return the derivatives of the rates at a reduced state up to the third."""
-    here = expansion(flow, values, x, higher=True)
-    return Derivatives(here.by_state, here.second, here.third)
 
 
 @dataclass(eq=False)
@@ -108,6 +94,7 @@ class EquilibriumCurve(SolutionCurve):
         return here.rate * self._rates, np.column_stack([by_state, by_value])
 
     kind: ClassVar[Literal["equilibrium"]] = "equilibrium"
+    corner_ahead = next_corner
 
     def solution(self, u: Floats) -> Equilibrium:
         """Return the equilibrium with these unknowns."""
@@ -126,11 +113,7 @@ class EquilibriumCurve(SolutionCurve):
 
     def normal_form(self, u: Floats) -> Derivatives:
         """Return the derivatives of which normal forms are made."""
-        return derivatives_at(self.flow, self.values_at(u), self.state(u))
-
-    def corner_ahead(self, here: CurvePoint, step: float) -> tuple[CurvePoint, CurvePoint] | None:
-        """Return the corner within the next step with the tangents that arrive there and leave it."""
-        return corner_ahead(self, here, step)
+        return expansion(self.flow, self.values_at(u), self.state(u), higher=True)
 
     def extremes(self, u: Floats) -> tuple[Floats, Floats]:
         """Return the least and the largest values of the components: twice the equilibrium."""
@@ -163,10 +146,9 @@ class EquilibriumCurve(SolutionCurve):
         here = self.at(place.u)
         values = np.linalg.eigvals(here.by_state).astype(complex)
         pairs = [a + b for a, b in combinations(values * self.flow.clock, 2)]
-        complex_pair, nothing = float(np.prod(pairs).real) if pairs else float("nan"), float("nan")
+        complex_pair = float(np.prod(pairs).real) if pairs else float("nan")
         determinant = float(np.linalg.det(here.by_state * self.flow.clock))
-        fold = float(place.tangent[-1])
-        return TestFunctions(fold, determinant, nothing, complex_pair, here.surfaces, values)
+        return TestFunctions(values, float(place.tangent[-1]), determinant, complex_pair=complex_pair)
 
     def kind_at(self, name: str, here: TestFunctions) -> str:
         """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""

@@ -9,6 +9,13 @@ import numpy as np
 from .equilibrium_curve import expansion
 from .flow_map import Floats, FlowMap
 
+__all__ = ["AWAY", "FAR", "FINE", "LEAVES", "Eigendirection", "direction_alone"]
+
+AWAY = 1e-6  # Distance from the equilibrium, in typical sizes, within which the manifold is straight.
+FINE = 24  # Samples in a typical time along a manifold.
+FAR = 30.0  # Typical sizes, beyond which nothing comes back.
+LEAVES = 80  # Most typical times in which a manifold leaves the equilibrium.
+
 
 @dataclass(frozen=True, eq=False)
 class Eigendirection:
@@ -20,6 +27,10 @@ class Eigendirection:
     number: float
     vector: Floats
     left: Floats
+
+    def start(self, flow: FlowMap, rest: Floats, sign: float, away: float = AWAY) -> Floats:
+        """Return the state on one side of the manifold at a distance from the equilibrium."""
+        return np.asarray(rest + flow.size * sign * away * self.vector)
 
 
 def direction_alone(flow: FlowMap, values: Floats, rest: Floats, side: float) -> Eigendirection | None:

@@ -10,7 +10,7 @@ import numpy as np
 from udd.errors import IntegrationError
 
 from .connecting_orbits import Connection
-from .equilibrium_curve import EquilibriumCurve, derivatives_at
+from .equilibrium_curve import EquilibriumCurve, expansion
 from .error_bounds import rounding_of, scatter
 from .flow_map import Floats
 from .normal_forms import (
@@ -162,9 +162,7 @@ def watched_functions(kind: str, point: SurfacePoint, slope: Floats) -> dict[str
     for name in _WATCHED.get(kind, ("unit_multiplier", "complex_pair")):
         if name == "lyapunov":
             at = point.curve.normal_form(point.v[:-1])
-            values[name] = (
-                float("nan") if at is None else first_lyapunov_coefficient(at.by_state, at.second, at.third)
-            )
+            values[name] = float("nan") if at is None else first_lyapunov_coefficient(at)
         else:
             values[name] = float(slope[0]) if name == "bend" else getattr(signs, name)
     return values
@@ -251,7 +249,9 @@ def _of_multipliers(kind: str, name: str, values: np.ndarray) -> str:
 
 def _second_lyapunov(curve: EquilibriumCurve, u: Floats) -> float:
     flow, values = curve.flow, curve.values_at(u)
-    return second_lyapunov_coefficient(lambda x: derivatives_at(flow, values, x), curve.state(u), flow.size)
+    return second_lyapunov_coefficient(
+        lambda x: expansion(flow, values, x, higher=True), curve.state(u), flow.size
+    )
 
 
 def _coefficients(kind: str, point: SurfacePoint) -> dict[str, float]:

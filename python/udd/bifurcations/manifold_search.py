@@ -15,9 +15,9 @@ from udd.errors import IntegrationError, ModelError
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats
 
-__all__ = ["Accuracy", "brackets", "converge", "distinct", "secant"]
+__all__ = ["Accuracy", "brackets", "converge", "distinct", "secant", "until_it_stands"]
 
-_ROUNDS = 12  # Largest number of rounds about the cycle.
+_ROUNDS = 11  # Largest number of rounds about the cycle.
 _STANDS = 1e-13  # Relative change below which the parameter has converged.
 _STEPS = 50  # Steps of the secant method.
 _ALIKE = 1e-9  # Relative distance of two results for one value.
@@ -66,17 +66,33 @@ def converge(
         and with a start ten times further from the source.
     rounds : int
     """
-    rounds, moved = 0, step
-    for rounds in range(1, _ROUNDS):
-        after = solve(x, rounds, moved, accuracy)
-        moved, x = float(abs(after[0] - x[0])), after
-        if moved < _STANDS * abs(x[0]):
-            break
+    x, moved, rounds = until_it_stands(
+        x, lambda y, k, moved: solve(y, k, moved, accuracy), lambda y: float(y[0]), step, _ROUNDS
+    )
     value = float(x[0])
     error = moved + float(rounding_of(value))
     for poorer in (Accuracy(10.0 * accuracy.away), Accuracy(accuracy.away, COARSE)):
         error += abs(float(solve(x, rounds, 1e-7 * abs(value), poorer)[0]) - value)
     return x, error, rounds
+
+
+def until_it_stands(
+    x: Mark,
+    improve: Callable[[Mark, int, float], Mark],
+    value: Callable[[Mark], float],
+    moved: float,
+    most: int,
+) -> tuple[Mark, float, int]:
+    """Improve a solution until its value stands; return it with the last change and the number of rounds.
+
+    `improve` takes a solution, the number of the round from 1 on, and the change in the round before.
+    """
+    for k in range(1, most + 1):
+        after = improve(x, k, moved)
+        moved, x = abs(value(after) - value(x)), after
+        if moved < _STANDS * abs(value(x)):
+            break
+    return x, moved, k
 
 
 def secant(height: Callable[[Floats], tuple[float, Floats]], x: Floats, step: float) -> Floats:

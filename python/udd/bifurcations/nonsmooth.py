@@ -12,7 +12,7 @@ from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point
 if TYPE_CHECKING:
     from .equilibrium_curve import EquilibriumCurve
 
-__all__ = ["corner_ahead"]
+__all__ = ["next_corner"]
 
 _ON = 1e-13  # Size of the surface's function, relative to its change over the step, that is zero.
 _PART = 0.7  # Longest step, in distances to the surface.
@@ -21,7 +21,7 @@ _SMALL = 1e-6  # Step for the slope of the surface's function along the branch.
 _BEYOND = 1e-7  # Distance beyond the corner at which the other law is evaluated, in scaled unknowns.
 
 
-def corner_ahead(
+def next_corner(
     curve: EquilibriumCurve, here: CurvePoint, step: float
 ) -> tuple[CurvePoint, CurvePoint] | None:
     """Return the corner within the next step, or None.

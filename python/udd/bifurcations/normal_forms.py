@@ -56,23 +56,22 @@ def _hopf_vectors(by_state: Floats) -> tuple[float, Any, Any] | None:
     return frequency, q, p / np.vdot(p, q).conj()  # <p, q> = 1
 
 
-def first_lyapunov_coefficient(by_state: Floats, second: Floats, third: Floats) -> float:
+def first_lyapunov_coefficient(at: Derivatives) -> float:
     """Return the first Lyapunov coefficient of the complex pair of eigenvalues nearest to the imaginary axis.
 
     Negative where cycles are born stable. The formula is (5.39) of the book, with the right eigenvector of
     length 1; NaN where there is no complex pair.
     """
-    vectors = _hopf_vectors(by_state)
+    vectors = _hopf_vectors(at.by_state)
     if vectors is None:
         return float("nan")
     frequency, q, p = vectors
-    at = Derivatives(by_state, second, third)
     # At the bifurcation itself the pair is purely imaginary.
     eye = np.eye(len(q))
     cubic = at.c(q, q, q.conj())
     # A singular matrix, as at a fold, leaves the least-squares solution.
-    slow = at.b(q, np.linalg.lstsq(by_state.astype(complex), at.b(q, q.conj()), rcond=None)[0])
-    fast = at.b(q.conj(), np.linalg.solve(2j * frequency * eye - by_state, at.b(q, q)))
+    slow = at.b(q, np.linalg.lstsq(at.by_state.astype(complex), at.b(q, q.conj()), rcond=None)[0])
+    fast = at.b(q.conj(), np.linalg.solve(2j * frequency * eye - at.by_state, at.b(q, q)))
     return float((np.vdot(p, cubic) - 2.0 * np.vdot(p, slow) + np.vdot(p, fast)).real / (2.0 * frequency))
 
 

@@ -239,6 +239,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         return np.ascontiguousarray(factors)
 
     kind: ClassVar[Literal["cycle"]] = "cycle"
+    follows_liouville, crossings, extremes = as_liouville, crossings_of, extremes_of
 
     def solution(self, u: Floats) -> PeriodicOrbit:
         """Return the cycle with these unknowns."""
@@ -333,18 +334,6 @@ class PeriodicOrbitCurve(SolutionCurve):
         """Return the scaled time and parameter."""
         return np.array([self.span(u) / self.clock, u[-1]])
 
-    def follows_liouville(self, u: Floats) -> bool:
-        """Return True if the multipliers agree with the divergence along the orbit."""
-        return as_liouville(self, u)
-
-    def crossings(self, u: Floats, section: str | None, direction: str | None) -> Floats:
-        """Return the states (k, dim) at which a cycle crosses a section."""
-        return crossings_of(self, u, section, direction)
-
-    def extremes(self, u: Floats) -> tuple[Floats, Floats]:
-        """Return the least and the largest values of the components; 0 for irrelevant angles."""
-        return extremes_of(self, u)
-
     def doubled(self, u: Floats) -> tuple[Self, Floats]:
         """Return the curve of cycles that close after twice the time, and two rounds of this one on it."""
         nodes = self.nodes(u)
@@ -381,9 +370,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         """Return the test functions at a point, from the runs that the point was corrected with."""
         multipliers = multipliers_at(self, place.u)
         if not multipliers.decided:
-            nothing = float("nan")
-            fold = float(place.tangent[-1])
-            return TestFunctions(fold, nothing, nothing, nothing, np.zeros(0), multipliers.values)
+            return TestFunctions(multipliers.values, float(place.tangent[-1]))
         return self._decided_functions(place, multipliers)
 
     def _decided_functions(self, place: CurvePoint, multipliers: Multipliers) -> TestFunctions:
@@ -395,9 +382,7 @@ class PeriodicOrbitCurve(SolutionCurve):
         )
         complex_pair = product_less(logs, phases, 1.0) if pairs else float("nan")
         plus, minus = (product_less(multipliers.log, multipliers.phases, unit) for unit in (1.0, -1.0))
-        return TestFunctions(
-            float(place.tangent[-1]), plus, minus, complex_pair, np.zeros(0), multipliers.values
-        )
+        return TestFunctions(multipliers.values, float(place.tangent[-1]), plus, minus, complex_pair)
 
     def kind_at(self, name: str, here: TestFunctions) -> str:
         """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""
