@@ -532,6 +532,8 @@ SWING = [f"{k / 25},{0.3 * (-1) ** k}" for k in range(30)]
     ("rows", "more", "said"),
     [
         (["t,angel", *SWING], [], "which of them is it, --columns theta=...?"),
+        (["Zeit in s,Winkel in Grad", *SWING], [], 'try --columns "t=Zeit in s,theta=Winkel in Grad"'),
+        (["tijd (s),hoek (graden)", *SWING], [], 'try --columns "t=tijd (s),theta=hoek (graden)"'),
         (["theta,load", *SWING], [], "say how many a second, --sampling HZ"),
         (["t,theta", *SWING[:5], *SWING[4:]], [], "(--repeated first keeps the first of such rows)"),
         (["t,theta", *SWING, *SWING], [], "(--part 0, --part 1 ... reads the rows between such jumps)"),

@@ -7,7 +7,7 @@ import gc
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from udd._util.json_output import as_json
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = parser.parse_args(argv)
         with warnings.catch_warnings():
             warnings.simplefilter("always", UserWarning)
-            warnings.showwarning = _warn
+            warnings.showwarning = _warner()
             with speaking("" if args.command == "app" else f"{args.command} is at work"):
                 answer: CommandResult = args.run(args)
         _print(answer, args.json)
@@ -92,5 +92,14 @@ def _fail(message: str) -> int:
     return 1
 
 
-def _warn(message: Warning | str, *_details: Any, **_options: Any) -> None:
-    print(f"udd: warning: {' '.join(in_options(str(message)).split())}", file=sys.stderr)
+def _warner() -> Callable[..., None]:
+    """Return a function that prints warnings, each text once: options are checked before and after a film."""
+    printed: set[str] = set()
+
+    def warn(message: Warning | str, *_details: Any, **_options: Any) -> None:
+        text = " ".join(in_options(str(message)).split())
+        if text not in printed:
+            print(f"udd: warning: {text}", file=sys.stderr)
+        printed.add(text)
+
+    return warn

@@ -15,6 +15,7 @@ from udd.errors import UddError
 from .option_names import OPTIONS
 from .options import add_disk, add_pendulum, disk, effects, given, names, pendulum, refuse_others
 from .output import shown_progress
+from .span import add_span, hint_at_rest, part_of
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -104,6 +105,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         metavar="BYTES",
         help="bytes that a table may unpack to (default: 1e9); larger ones are refused",
     )
+    add_span(parser)
     add_partial(parser)
     if several:
         parser.add_argument(
@@ -164,6 +166,9 @@ def inputs_of(args: argparse.Namespace) -> Inputs:
     measurements, models, films = [], [], []
     for one in _each(args):
         measurement, film = measurement_of(one)
+        measurement = part_of(one, measurement)
+        if measurement.names == ("Omega",):
+            hint_at_rest(one, measurement)
         measurements.append(measurement)
         models.append(model_of(one, measurement))
         films.append(film)
@@ -301,7 +306,9 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
 
 def _pendulum(args: argparse.Namespace, measurement: Measurement) -> Pendulum:
     """Make a pendulum; without --pendulum its size comes from the header."""
-    refuse_others(args, "pendulum", f"{args.file} is a pendulum's record: ")
+    of_bob = "atan2(x, -y)" in str(measurement.meta.get("columns"))
+    hint = ', from x and y (of a disk say --columns "Y=...,Z=...,beta=...")' if of_bob else ""
+    refuse_others(args, "pendulum", f"{args.file} is a pendulum's record{hint}: ")
     length, inertia = args.pendulum, args.inertia
     if length is None:
         length = _number(args, measurement, "length")

@@ -18,6 +18,7 @@ OPTIONS = {
 _NAME = f"(?<![^\\s(])({'|'.join(OPTIONS)})"
 _ONE_COLUMN = re.compile(rf"{_NAME}=\{{'(\w+)': \.\.\.\}}")
 _TEXT = re.compile(rf'{_NAME}="([^"]*)"')
+_PLAIN = re.compile(r"[\w=.,-]*$")
 _WORD = re.compile(rf"{_NAME}=(\w+)")
 _BARE = re.compile(r"(?<![^\s(])rate=(?!\S)")
 _REFUSED = "is for files|must be a positive number of samples|must be a whole number from|must look like"
@@ -36,12 +37,17 @@ def in_options(message: str) -> str:
     'say how many a second, --sampling HZ'
     >>> in_options("which of them is it, columns={'theta': ...}?")
     'which of them is it, --columns theta=...?'
+    >>> in_options('try columns="theta=Winkel in Grad"')
+    'try --columns "theta=Winkel in Grad"'
     >>> in_options("say where the motion starts, state0={'v': ...}")
     'say where the motion starts, "state0": {"v": ...} in the file of --model'
     """
     message = _ONE_COLUMN.sub(lambda m: f"{OPTIONS[m[1]]} {m[2]}=...", message)
-    for spelling in (_TEXT, _WORD):
-        message = spelling.sub(lambda m: f"{OPTIONS[m[1]]} {m[2]}", message)
+    # A shell needs the quotation marks around blanks and brackets.
+    message = _TEXT.sub(
+        lambda m: f"{OPTIONS[m[1]]} " + (m[2] if _PLAIN.match(m[2]) else f'"{m[2]}"'), message
+    )
+    message = _WORD.sub(lambda m: f"{OPTIONS[m[1]]} {m[2]}", message)
     message = _BARE.sub(f"{OPTIONS['rate']} HZ", message)
     message = _SUBJECT.sub(lambda m: OPTIONS[m[1]], message)
     return _START.sub(lambda m: '"state0": {' + m[1].replace("'", '"') + "} in the file of --model", message)

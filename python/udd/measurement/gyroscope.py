@@ -14,6 +14,8 @@ from .read import headings_of, read_measurement
 from .table import Measurement
 
 RATE = ("Omega",)
+_TURNS = 0.1  # share of the largest rate, from which on a pendulum turns
+_HELD = 0.2  # s of rest that matter: a pendulum that is let go turns sooner
 _PLACES = {"theta", "Y", "Z", "beta", "x", "y"}
 
 
@@ -76,3 +78,16 @@ def read_gyroscope(
         )
     best = max(signed, key=lambda k: float(np.nanstd(read[k].values)))
     return read[best].with_meta(gyroscope=names[best])
+
+
+def starts_to_turn(record: Measurement) -> float | None:
+    """Return the time at which a pendulum begins to turn [s]; None if it turns from the beginning.
+
+    Before that time a hand may have held it. Then no law of a pendulum fits the beginning of the record.
+    """
+    rate = np.abs(record.values[:, 0])
+    largest = np.nanmax(rate, initial=0.0)
+    turns = np.flatnonzero(rate > _TURNS * largest)
+    if turns.size == 0 or record.t[turns[0]] - record.t[0] <= _HELD:
+        return None
+    return float(np.ceil(100.0 * record.t[turns[0]]) / 100.0)

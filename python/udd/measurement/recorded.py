@@ -14,9 +14,11 @@ from udd.errors import MeasurementError
 from .formats import Table
 from .formats.headings import COUNTED, USUAL, Heading, ending, in_base_units, size
 from .formats.text_column import TextColumn
+from .guesses import guessed
 from .input_signal import Hold, InputSignal, named_signal
 
 Asked = str | tuple[str, str]
+_MOTIONS = ({"theta"}, {"Omega"}, {"Y", "Z", "beta"})  # columns of a pendulum or a disk besides t
 
 
 @dataclass(frozen=True)
@@ -106,16 +108,26 @@ class Recorded:
                 if all(self.find(table, "t") is None for table in self.tables) and self.rate is None:
                     break  # what is said of the time is said first
                 if self.mapping is None:
-                    raise MeasurementError(
-                        f"{self.missing(name)}; which of them is it, columns={{{name!r}: ...}}?"
-                    )
+                    asked = self._guess() or f"which of them is it, columns={{{name!r}: ...}}?"
+                    raise MeasurementError(f"{self.missing(name)}; {asked}")
                 raise self.missing(_text(self.mapping.get(name, name)))
         else:
             clocks = ", ".join(table.name or f"{len(table)} rows" for table in self.tables)
             raise MeasurementError(
                 f"{', '.join(names)} are in tables with different clocks ({clocks}); read each by columns="
             )
-        raise self.missing("t")
+        guess = self._guess()
+        raise MeasurementError(f"{self.missing('t')}; {guess}") if guess else self.missing("t")
+
+    def _guess(self) -> str:
+        """Return the columns to try, by their headings in English, German or Dutch; empty if none fit."""
+        table = max(self.tables, key=len)
+        roles = guessed(table)
+        columns = {role: table.headings[k].raw for k, role in enumerate(roles) if role}
+        fits = set(columns) - {"t"} in _MOTIONS and "t" in columns
+        if self.mapping is not None or not fits or any("," in raw or '"' in raw for raw in columns.values()):
+            return ""
+        return f'try columns="{",".join(f"{role}={raw}" for role, raw in columns.items())}"'
 
 
 @dataclass

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 _ALIASES = {"T": "t", "angle": "theta", "Angle": "theta", "Theta": "theta", "θ": "theta", "β": "beta"}
 _ALIASES |= {"Beta": "beta", "X": "x"}
-_TIMES = {"time", "zeit", "temps", "tiempo", "tempo"}
+_TIMES = {"time", "zeit", "tijd", "temps", "tiempo", "tempo"}
 _TURN = 2 * math.pi
 _ANGLES = {
     **dict.fromkeys(("rad", "radian", "radians"), 1.0),
     "mrad": 1e-3,
     # Grad is German for degrees; grad may be gradians, and is not known.
-    **dict.fromkeys(("deg", "degree", "degrees", "°", "º", "Grad"), math.pi / 180),
+    **dict.fromkeys(("deg", "degree", "degrees", "°", "º", "Grad", "graden"), math.pi / 180),
     "arcmin": math.pi / 180 / 60,
     "arcsec": math.pi / 180 / 3600,
     **dict.fromkeys(("rev", "turn", "turns"), _TURN),
@@ -27,7 +27,9 @@ _LENGTHS = {
     "ft": 0.3048,
 }
 _DURATIONS = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
+    **dict.fromkeys(
+        ("s", "sec", "secs", "second", "seconds", "sek", "sekunden", "Sekunden", "seconden"), 1.0
+    ),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
     **{"us": 1e-6, "µs": 1e-6, "ns": 1e-9},
     **dict.fromkeys(("min", "minute", "minutes"), 60.0),
