@@ -132,6 +132,20 @@ def test_what_was_measured_is_kept_when_a_job_fails(tmp_path: Path, monkeypatch:
     assert worker._kept() == [{"name": "measurement.csv", "title": "The measured motion"}]
 
 
+def test_a_held_beginning_is_seen_and_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rate = np.where(T < 0.5, 0.0, np.sin(3 * (T - 0.5)))
+    path = table(tmp_path, "Zeit (s);Gyroskop x (rad/s)", T, rate, name="upload.csv")
+    begin = look(path)["begin"]
+    assert 0.5 < begin < 0.6
+    monkeypatch.chdir(tmp_path)
+    worker.OUT.mkdir()
+    asked = {"file": "upload.csv", "film": False, "begin": begin, "end": 1.5}
+    with pytest.raises(UddError, match="length in cm"):
+        worker._loop(asked, lambda _message: None)
+    kept = udd.read_measurement(worker.OUT / "measurement.csv", {"Omega": "Omega"})
+    assert begin <= kept.t[0] < begin + 0.03 and 1.47 < kept.t[-1] <= 1.5
+
+
 def test_a_fault_of_the_program_is_called_so(tmp_path: Path) -> None:
     code = (
         "from udd.app import worker\n"

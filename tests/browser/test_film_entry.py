@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -67,6 +68,21 @@ def test_a_phone_needs_a_length_alone(opened: Opened) -> None:
     assert "waiting" not in page.get_attribute("#go", "class")
     page.fill("#loop-length", "80")
     assert why(opened) == ""
+
+
+def test_the_part_before_a_pendulum_swings_is_proposed_to_be_left_out(opened: Opened) -> None:
+    page = opened.go()
+    page.click("#to-film")
+    rate = [0.0] * 100 + [math.sin(k / 20) for k in range(200)]
+    rows = "".join(f"{k / 50:.2f},{x:.4f}\n" for k, x in enumerate(rate))
+    buffer = ("Time (s),Gyroscope x (rad/s)\n" + rows).encode()
+    page.set_input_files("#file", {"name": "phone.csv", "mimeType": "text/csv", "buffer": buffer})
+    until(page, "!document.getElementById('columns').hidden")
+    assert 2.0 < float(page.input_value("#loop-begin")) < 2.3
+    assert page.locator("#begin-said").text_content().startswith("The pendulum hardly turns before 2.")
+    page.set_input_files("#file", udd.examples.path("phone.csv"))
+    until(page, "document.getElementById('begin-said').textContent === ''")
+    assert page.input_value("#loop-begin") == ""
 
 
 def test_a_driven_pendulum_goes_from_its_table_to_the_verdict(opened: Opened) -> None:

@@ -194,9 +194,13 @@ async def _again(jobs: Jobs, request: Request, folder: Path) -> dict[str, Any]:
     return {**job.asked, "hints": hints}
 
 
+#: Numbers that come with a file, in m and s; the last two are the ends of the part of a table to use.
+_NUMBERS = ("W", "R", "length", "begin", "end")
+
+
 async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
     """Return the question to a job; its file is put into its folder."""
-    given = {name: value for name in ("W", "R", "length") if (value := _number(request, name)) is not None}
+    given = {name: value for name in _NUMBERS if (value := _number(request, name)) is not None}
     if kind == "film":
         declared = request.headers.get("content-length", "0")
         if declared.isdigit() and int(declared) > limits.UPLOAD:

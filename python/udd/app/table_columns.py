@@ -14,7 +14,7 @@ from udd.measurement import InputSignal, Measurement, read_measurement
 from udd.measurement.formats.headings import COUNTED, UNITS
 from udd.measurement.formats.table import Table
 from udd.measurement.guesses import ROLES, guessed, is_input
-from udd.measurement.gyroscope import holds_rates_alone, read_gyroscope
+from udd.measurement.gyroscope import holds_rates_alone, read_gyroscope, starts_to_turn
 from udd.measurement.read import tables_of
 
 from .driven_models import DRIVE, TORQUE
@@ -48,7 +48,8 @@ def look(path: Path) -> dict[str, Any]:
         ],
         "rows": len(table),
         "meta": {name: _number(table.meta.get(name)) for name in _KNOWN},
-        "kind": _kind(path),
+        "kind": (kind := _kind(path)),
+        "begin": starts_to_turn(read_gyroscope(path)) if kind == "gyroscope" else None,
         "units": {role: list(UNITS[_base(role)]) for role in ROLES} | {_INPUT: ["", *UNITS["m/s"]]},
     }
 

@@ -85,6 +85,7 @@ def _sentence(error: object, file: str) -> str:
 def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """Find the verdict for a film or a table."""
     from udd.discovery import discover
+    from udd.measurement.time_span import between
     from udd.models import Disk, Model, Pendulum
 
     from .table_columns import measurement_of
@@ -99,6 +100,7 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
         measurement = measurement.with_meta(**constants)
     else:
         measurement = measurement_of(file, asked.get("columns") or [], constants)
+        measurement = between(measurement, asked.get("begin"), asked.get("end"))
     measurement.to_csv(OUT / "measurement.csv")
     swings = measurement.names in (("theta",), ("Omega",))
     length, R = asked.get("length") or measurement.meta.get("length"), measurement.meta.get("R", 0.08)

@@ -15,7 +15,7 @@ from udd.errors import UddError
 from .option_names import OPTIONS
 from .options import add_disk, add_pendulum, disk, effects, given, names, pendulum, refuse_others
 from .output import shown_progress
-from .span import add_span, hint_at_rest, part_of
+from .span import add_span, hint_at_rest
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -166,7 +166,10 @@ def inputs_of(args: argparse.Namespace) -> Inputs:
     measurements, models, films = [], [], []
     for one in _each(args):
         measurement, film = measurement_of(one)
-        measurement = part_of(one, measurement)
+        if not (one.begin is one.end is None):
+            from udd.measurement.time_span import between
+
+            measurement = between(measurement, one.begin, one.end)
         if measurement.names == ("Omega",):
             hint_at_rest(one, measurement)
         measurements.append(measurement)

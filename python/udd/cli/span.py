@@ -1,13 +1,10 @@
-"""Options for the part of a record to use, and a hint about a pendulum that was held at first."""
+"""Options for the part of a record to use, and a hint about a pendulum in a hand."""
 
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from typing import TYPE_CHECKING
-
-from udd.errors import UddError
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -31,33 +28,8 @@ def add_span(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def part_of(args: argparse.Namespace, measurement: Measurement) -> Measurement:
-    """Return the part of a record between ``--from`` and ``--to``.
-
-    Raises
-    ------
-    UddError
-        The part has fewer than two rows.
-    """
-    begin = -math.inf if args.begin is None else args.begin
-    end = math.inf if args.end is None else args.end
-    first, last = float(measurement.t[0]), float(measurement.t[-1])
-    inside = (measurement.t >= begin) & (measurement.t <= end)
-    if inside.sum() < 2:
-        given = [
-            f"{option} {value:.6g}"
-            for option, value in (("--from", args.begin), ("--to", args.end))
-            if value is not None
-        ]
-        raise UddError(
-            f"{' '.join(given)} leaves {inside.sum()} rows of {args.file}; its times go from {first:.4g} to "
-            f"{last:.4g} s"
-        )
-    return measurement if inside.all() else measurement.rows(inside)
-
-
 def hint_at_rest(args: argparse.Namespace, measurement: Measurement) -> None:
-    """Print the option that leaves out a beginning in which a pendulum was held."""
+    """Print the option that leaves out the beginning, if the pendulum does not turn there."""
     from udd.measurement.gyroscope import starts_to_turn
 
     begin = starts_to_turn(measurement)

@@ -21,6 +21,10 @@ export class Loop {
       const key = { wheel: "loop_wheel_R", rpm: "loop_rpm" }[name] ?? `loop_${name}`;
       return [name, new NumberField($(`loop-${name}`), { name: t(key), least: 0, most: null, optional: true }, () => this.tell())];
     }));
+    for (const name of ["begin", "end"]) {
+      const about = { name: t(`loop_${name}`), least: null, most: null, optional: true };
+      this.fields[name] = new NumberField($(`loop-${name}`), about, () => this.tell());
+    }
     for (const name of ["W", "R", "length"]) $(`loop-${name}`).addEventListener("input", () => this.tell());
     for (const name of ["wheel", "rpm"]) $(`loop-${name}`).addEventListener("input", () => this.fromWheel());
     this.columns = new Columns(() => this.tell());
@@ -84,6 +88,9 @@ export class Loop {
       if (file !== this.file) return;
       this.table = found;
       this.columns.show(found);
+      this.fields.begin.show(found.begin === null ? "" : String(found.begin));
+      this.fields.end.show("");
+      $("begin-said").textContent = found.begin === null ? "" : t("loop_begin_said", { t: found.begin });
     } catch (error) {
       if (file === this.file) this.fail(error.message);
     }
@@ -152,6 +159,11 @@ export class Loop {
       if (value !== null) values[name] = String(+(value / 100).toPrecision(12));
     }
     if (this.why) return this.fail(this.tooLarge ? t("loop_too_large", { size: this.page.catalogue.limits.upload >> 20 }) : this.why);
+    for (const name of this.table ? ["begin", "end"] : []) {
+      const { value } = this.fields[name];
+      if (value === undefined) return this.tell();
+      if (value !== null) values[name] = String(value);
+    }
     const chosen = this.isFilm || !this.table ? [] : this.columns.chosen;
     if (chosen.length) values.columns = JSON.stringify(chosen);
     await this.begin("film", values, this.file);
@@ -159,7 +171,7 @@ export class Loop {
 
   async begin(kind, values = {}, body = undefined) {
     this.fail("");
-    this.stages([t(kind === "film" ? "loop_uploading" : "loop_waiting")]);
+    this.stages([t(kind === "film" ? "loop_uploading" : "loop_starting")]);
     const canvas = $("frames");
     canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
     canvas.parentElement.hidden = true;
