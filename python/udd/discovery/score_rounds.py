@@ -112,7 +112,7 @@ def score_round(
     alone = looser is fitted or beyond_schedule(looser)
     chaotic = fitted.model.profile.discovery.chaotic
     rounds = parallel_map(watched(score), [looser] if alone or chaotic else [fitted, looser])
-    if not alone and chaotic and not (rounds[0].passing() or rounds[0].passing_curves()):
+    if looser is not fitted and len(rounds) == 1 and not (rounds[0].passing() or rounds[0].passing_curves()):
         rounds.append(watched(score)(fitted))
     return replace(
         max(rounds, key=ScoreRound.strongest), comparisons=sum(entry.comparisons for entry in rounds)

@@ -29,6 +29,7 @@ from .model_error_schedule import (
     ROUGH,
     Goal,
     eased,
+    nearly_converged,
     provisional_fit,
     reduce_model_error,
     with_negligible_model_error,
@@ -534,6 +535,8 @@ def _tightened(fitted: Fit, trusted: bool) -> Fit:
     try:
         problem, point = _own_noise(fitted) if trusted else (fitted.problem, fitted.point)
         result = reduce_model_error(fitted.measurements, problem, point, schedule[fitted.level :])
+        # A law with a kink converges slowly. Without this it is compared at the noise of the search.
+        result = result if result.converged else nearly_converged(result)
     except SolveError:  # for example, a threshold that ends at or below zero
         return fitted
     return result if result.converged else fitted

@@ -236,8 +236,17 @@ def with_negligible_model_error(fitted: Fit) -> Fit:
     )
 
 
-def with_noise_correlation(fitted: Fit) -> Fit:
-    """Refit with AR(1) noise if that raises the likelihood.
+def nearly_converged(fitted: Fit) -> Fit:
+    """Return a fit that stops at a small decrease in chi2, with AR(1) noise if that raises the likelihood.
+
+    Its evidence is accurate enough for a comparison.
+    """
+    result = solve(fitted.measurements, fitted.problem, fitted.point, FEW, ROUGH)
+    return with_noise_correlation(result, ROUGH) if result.converged else fitted
+
+
+def with_noise_correlation(fitted: Fit, decrease: float | None = None) -> Fit:
+    """Refit with AR(1) noise if that raises the likelihood, until chi2 falls by less than `decrease`.
 
     Frames with correlated noise carry less information than independent ones. Without this the model error
     would be too large, following the noise, and standard errors would be too small.
@@ -251,7 +260,7 @@ def with_noise_correlation(fitted: Fit) -> Fit:
         return fitted
     noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
     problem = replace(fitted.problem, noise=replace(noise, memory=memory))
-    result = solve(fitted.measurements, problem, fitted.point, STEPS, _enough(problem))
+    result = solve(fitted.measurements, problem, fitted.point, STEPS, decrease or _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
 
 
