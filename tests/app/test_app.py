@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import struct
@@ -22,6 +23,7 @@ from udd.app import growing_run, limits, maps, security, server, spec
 from udd.app.presets import catalogue
 from udd.app.serving import hosts_of
 from udd.cli import main
+from udd.discovery.verdict import verdict_of
 from udd.errors import IncompleteWarning
 from udd.simulation.trajectory import integrated
 
@@ -415,6 +417,10 @@ def test_a_language_is_complete(language: str) -> None:
             assert other[key] != text or len(words) < 3, key
         else:
             assert [len(row) for row in other[key]] == [len(row) for row in text], key
+    verdicts = [row[0] for row in other["verdicts"]]
+    cases = itertools.product([[], [None]], [False, True], [[]], [False, True], [False, True])
+    assert verdicts == [row[0] for row in english["verdicts"]]
+    assert set(verdicts) == {verdict_of(*case) for case in cases}
     offered = re.search(r"LANGUAGES = {(.*)}", (STATIC / "texts.js").read_text())
     assert offered is not None and f"{language}:" in offered[1]
 

@@ -23,10 +23,10 @@ def of(discovery: Any) -> dict[str, Any]:
     origin = [str(text)] if (text := discovery.measurement.meta.get("origin")) else []
     return {
         "verdict": discovery.verdict,
-        "sentence": wording.verdict(discovery),
+        "sentence": _symbols(wording.verdict(discovery)),
         "effects": [
             {
-                "title": e.title,
+                "title": _symbols(e.title),
                 "equation": _symbols(e.equation),
                 "values": _values(e),
                 "p": e.p,
@@ -40,12 +40,12 @@ def of(discovery: Any) -> dict[str, Any]:
         "before": numbers.before,
         "after": numbers.after if discovery.effects else None,
         "floor": numbers.floor,
-        "span": numbers.span,
+        "horizon": discovery.horizon,
         "ratio": numbers.ratio if discovery.effects else None,
         "interval": numbers.interval if discovery.effects else None,
         "errors": [{key: text_of(text) for key, text in row.items()} for row in tables.errors(discovery)],
         "evidence": [
-            {"title": s.candidate.title, "chi2": s.chi2 if math.isfinite(s.chi2) else None}
+            {"title": _symbols(s.candidate.title), "chi2": s.chi2 if math.isfinite(s.chi2) else None}
             for s in (discovery.scans[0][:8] if discovery.scans else [])
         ],
         "explore": _explore(discovery),

@@ -289,7 +289,10 @@ export class Loop {
     this.show("found");
     this.fitted = found.explore;
     $("explore-fit").hidden = !found.explore;
-    $("verdict").textContent = found.verdict;
+    const verdict = new Map(list("verdicts")).get(found.verdict);
+    const meaning = new Map(list("terms")).get(found.verdict);
+    $("verdict").replaceChildren(meaning ? term(verdict, meaning) : verdict);
+    $("verdict-language").textContent = t("loop_english");
     $("sentence").textContent = found.sentence;
     $("added").replaceChildren(...found.effects.map((e) => {
       const p = document.createElement("p");
@@ -304,12 +307,14 @@ export class Loop {
       p.textContent = text;
       return p;
     }));
-    const span = found.of_spread ? `${found.span}, ${t("loop_of_spread")}` : found.span;
+    const range = (text) => text.replace(" to ", ` ${t("loop_to")} `);
+    const after = found.horizon === null ? t("loop_whole") : t("loop_horizon_after", { t: +found.horizon.toPrecision(3) });
+    const span = found.of_spread ? `${t("loop_of_spread")}, ${after}` : after;
     const note = (k) => (found.no_more_than_noise[k] ? `${span}; ${t("loop_no_more")}` : span);
     const figures = [[found.no_more_than_noise[0] ? "" : "before", t("loop_before"), found.before, note(0)]];
     if (found.after) {
       figures.push(["after", t("loop_after"), found.after, note(1)]);
-      figures.push(["", t("loop_ratio"), found.ratio, t("loop_interval", { interval: found.interval })]);
+      figures.push(["", t("loop_ratio"), found.ratio, t("loop_interval", { interval: range(found.interval) })]);
     }
     figures.push(["", t("loop_floor"), found.floor, span]);
     $("figures").replaceChildren(...figures.map(([kind, name, value, small]) => {
@@ -331,7 +336,7 @@ export class Loop {
     $("constants").replaceChildren(table(t("loop_constants"), columns, constants));
     explain($("constants"), [[t("loop_value"), t("loop_brackets")]]);
     $("constants").hidden = !constants.length;
-    const errors = found.errors.map((e) => [e.horizon, e.before, ...(found.after ? [e.after] : []), e.floor]);
+    const errors = found.errors.map((e) => [e.horizon, e.before, ...(found.after ? [e.after] : []), e.floor].map(range));
     const heads = [t("loop_horizon"), t("loop_before"), ...(found.after ? [t("loop_after")] : []), t("loop_floor")];
     $("errors").replaceChildren(table(t("loop_errors"), heads, errors));
     const evidence = found.evidence.map((e) => [e.title, e.chi2 === null ? "–" : e.chi2.toFixed(1)]);
@@ -342,7 +347,7 @@ export class Loop {
       return item;
     }));
     $("report").src = this.part("report.html");
-    for (const id of ["verdict", "sentence", "added", "figures", "evidence", "errors"]) explain($(id), list("terms"));
+    for (const id of ["sentence", "added", "figures", "evidence", "errors"]) explain($(id), list("terms"));
   }
 
   movie(parts, more) {
