@@ -190,7 +190,6 @@ pub fn fitted(model: AnyModel, asked: Asked<'_>) -> PyResult<Box<dyn Fitted>> {
     Ok(of! {
         AnyModel::Four(Either::First(family), values) => (family, values), (family, &values, DiskCamera);
         AnyModel::Two(Either::First(family), values) => (family, values), (family, &values, AngleSensor);
-        AnyModel::One(family, values) => (family, values), with_sensor(family, &values);
         AnyModel::Two(Either::Second(family), values) => (family, values), with_sensor(family, &values);
         AnyModel::Three(Either::Second(family), values) => (family, values), with_sensor(family, &values);
         AnyModel::Four(Either::Second(family), values) => (family, values), with_sensor(family, &values);

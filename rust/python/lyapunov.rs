@@ -157,7 +157,7 @@ fn frames<'py>(
     atol: f64,
     max_step: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.undriven()?.filled();
+    let model = AnyModel::from_python(model)?.undriven()?;
     let tolerance = Tolerance { rtol, atol, max_step };
     let (states, growth, covariant, dimension) = with_wide_model!(packets: &model, |family, values| {
         let x0 = state(&state0, family.idle())?;

@@ -25,16 +25,17 @@ const MAX_STATES: usize = 12;
 /// Models of as many states share what is compiled for that number.
 #[derive(Clone, Debug)]
 pub enum AnyModel {
-    One(FormulaFamily<1>, Vec<f64>),
+    /// Models of one state have a padding state.
     Two(Either<PendulumFamily, FormulaFamily<2>>, Vec<f64>),
     Three(Either<DleFamily, FormulaFamily<3>>, Vec<f64>),
     Four(Either<DiskFamily, FormulaFamily<4>>, Vec<f64>),
-    /// With LuGre friction, whose bristles are one more state.
-    Five(Either<WithLuGre<DiskFamily>, FormulaFamily<5>>, Vec<f64>),
+    /// With 5 or 6 states, padding included.
     Six(FormulaFamily<6>, Vec<f64>),
     /// With 7 to 12 states, padding included.
     Twelve(FormulaFamily<12>, Vec<f64>),
-    /// Apart from the others of three states, whose laws are smooth.
+    /// With LuGre friction, whose bristles are one more state. Its law is not smooth, so it is compiled separately.
+    BristledDisk(WithLuGre<DiskFamily>, Vec<f64>),
+    /// The same for a pendulum.
     BristledPendulum(WithLuGre<PendulumFamily>, Vec<f64>),
 }
 
@@ -43,12 +44,11 @@ pub enum AnyModel {
 macro_rules! with_model {
     ($model:expr, |$family:ident, $values:ident| $body:expr) => {
         match $model {
-            $crate::python::model::AnyModel::One($family, $values) => $body,
             $crate::python::model::AnyModel::Two($family, $values) => $body,
             $crate::python::model::AnyModel::Three($crate::model::Either::First($family), $values) => $body,
             $crate::python::model::AnyModel::Three($crate::model::Either::Second($family), $values) => $body,
             $crate::python::model::AnyModel::Four($family, $values) => $body,
-            $crate::python::model::AnyModel::Five($family, $values) => $body,
+            $crate::python::model::AnyModel::BristledDisk($family, $values) => $body,
             $crate::python::model::AnyModel::Six($family, $values) => $body,
             $crate::python::model::AnyModel::Twelve($family, $values) => $body,
             $crate::python::model::AnyModel::BristledPendulum($family, $values) => $body,
@@ -57,8 +57,7 @@ macro_rules! with_model {
 }
 pub(crate) use with_model;
 
-/// The same for work on packets and tangents, which takes long to compile: not for friction by bristles, and of
-/// [filled](AnyModel::filled) models.
+/// The same for work on packets and tangents, which takes long to compile: not for friction by bristles.
 ///
 /// `tangents` are for single numbers, and models of as many states share what is compiled. Among `packets` single runs of
 /// the DLE are compiled separately.
@@ -132,9 +131,7 @@ impl AnyModel {
         }
         let model = match kind.as_str() {
             "dle" => AnyModel::Three(Either::First(DleFamily), values),
-            "disk" if bristles => {
-                AnyModel::Five(Either::First(WithLuGre(DiskFamily { effects, edge })), values)
-            }
+            "disk" if bristles => AnyModel::BristledDisk(WithLuGre(DiskFamily { effects, edge }), values),
             "disk" => AnyModel::Four(Either::First(DiskFamily { effects, edge }), values),
             "pendulum" => {
                 able(&effects, Body::Pendulum)?;
@@ -159,8 +156,9 @@ impl AnyModel {
     pub fn to_fit(model: &Bound<'_, PyAny>) -> PyResult<Self> {
         let model = Self::from_python(model)?;
         let effects: &[Effect] = match &model {
-            AnyModel::Four(Either::First(family), _)
-            | AnyModel::Five(Either::First(WithLuGre(family)), _) => &family.effects,
+            AnyModel::Four(Either::First(family), _) | AnyModel::BristledDisk(WithLuGre(family), _) => {
+                &family.effects
+            }
             AnyModel::Two(Either::First(family), _) | AnyModel::BristledPendulum(WithLuGre(family), _) => {
                 &family.effects
             }
@@ -181,13 +179,11 @@ impl AnyModel {
             AnyModel::Three(Either::First(_), _) => &["omega", "y", "z"],
             AnyModel::Four(Either::First(_), _) => &["Omega", "Y", "Z", "beta"],
             AnyModel::Two(Either::First(_), _) => &["Omega", "theta"],
-            AnyModel::Five(Either::First(_), _) => &["Omega", "Y", "Z", "beta", "bristle"],
+            AnyModel::BristledDisk(..) => &["Omega", "Y", "Z", "beta", "bristle"],
             AnyModel::BristledPendulum(..) => &["Omega", "theta", "bristle"],
-            AnyModel::One(family, _) => return family.states(),
             AnyModel::Two(Either::Second(family), _) => return family.states(),
             AnyModel::Three(Either::Second(family), _) => return family.states(),
             AnyModel::Four(Either::Second(family), _) => return family.states(),
-            AnyModel::Five(Either::Second(family), _) => return family.states(),
             AnyModel::Six(family, _) => return family.states(),
             AnyModel::Twelve(family, _) => return family.states(),
         };
@@ -205,24 +201,12 @@ impl AnyModel {
         ))
     }
 
-    /// With padding states up to a number that analyses are compiled for: models of one state get a second one, those
-    /// of five a sixth.
-    pub fn filled(self) -> Self {
-        match self {
-            AnyModel::One(family, values) => AnyModel::Two(Either::Second(family.filled()), values),
-            AnyModel::Five(Either::Second(family), values) => AnyModel::Six(family.filled(), values),
-            other => other,
-        }
-    }
-
     /// The family of a user's own model with padding states up to the largest number.
     pub fn widest(&self) -> Option<FormulaFamily<MAX_STATES>> {
         Some(match self {
-            AnyModel::One(family, _) => family.filled(),
             AnyModel::Two(Either::Second(family), _) => family.filled(),
             AnyModel::Three(Either::Second(family), _) => family.filled(),
             AnyModel::Four(Either::Second(family), _) => family.filled(),
-            AnyModel::Five(Either::Second(family), _) => family.filled(),
             AnyModel::Six(family, _) => family.filled(),
             AnyModel::Twelve(family, _) => family.clone(),
             _ => return None,
@@ -236,14 +220,12 @@ impl AnyModel {
 
     /// Whether it is the user's own.
     pub fn is_own(&self) -> bool {
-        use AnyModel::{Five, Four, One, Six, Three, Twelve, Two};
+        use AnyModel::{Four, Six, Three, Twelve, Two};
         matches!(
             self,
-            One(..)
-                | Two(Either::Second(_), _)
+            Two(Either::Second(_), _)
                 | Three(Either::Second(_), _)
                 | Four(Either::Second(_), _)
-                | Five(Either::Second(_), _)
                 | Six(..)
                 | Twelve(..)
         )
@@ -348,12 +330,10 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
         };
     }
     parsed!(
-        1 => One<1> |own| own,
-        2 => Two<2> |own| Either::Second(own),
+        1..=2 => Two<2> |own| Either::Second(own),
         3 => Three<3> |own| Either::Second(own),
         4 => Four<4> |own| Either::Second(own),
-        5 => Five<5> |own| Either::Second(own),
-        6 => Six<6> |own| own,
+        5..=6 => Six<6> |own| own,
         7..=12 => Twelve<12> |own| own
     )
     .map_err(|(n, mistake)| ModelError::new_err(format!("the equation of {} {mistake}", states[n])))

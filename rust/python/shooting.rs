@@ -31,7 +31,7 @@ fn shoot<'py>(
     rtol: f64,
     atol: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let model = AnyModel::from_python(model)?.undriven()?.filled();
+    let model = AnyModel::from_python(model)?.undriven()?;
     let tolerance = Tolerance::new(rtol, atol);
     let rows = jobs::values(&model, &values)?;
     let (t, spans) = (t.as_slice()?, spans.as_slice()?);
