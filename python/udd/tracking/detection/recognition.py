@@ -16,6 +16,7 @@ from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
 from .colour_blobs import COLOURS, FEWEST, Sight, sightings
+from .evidence import shown
 from .layout_matching import sightings as matching
 from .still_patches import split
 from .survey import Survey, slowest
@@ -69,9 +70,10 @@ def recognise(film: Film, look_over: Survey, options: TrackOptions) -> Recogniti
     if len(seen) < FEWEST:
         standard = options.layout.standard
         what = "red, orange, blue and green (clockwise)" if standard else "the layout's colours"
+        pictures = look_over.pictures
         raise TrackError(
-            f"{film.path}: no disk with marks in {what} was found: "
-            f"{len(seen)} of {len(look_over.pictures)} frames looked at show all {len(options.layout.places)}"
+            f"{film.path}: no disk with marks in {what} was found: {len(seen)} of {len(pictures)} "
+            f"frames looked at show all {len(options.layout.places)}; {shown(pictures, options)}"
         )
     if missing is not None:
         warnings.warn(

@@ -35,6 +35,7 @@ SCATTERS = 4.0  # ... if that is so many times the frames' own scatter
 BENDS = 6  # degree of the polynomial by which lens and tilt change the distance
 FEWEST = 10  # frames that show the bob
 MOVED = 3.0  # pixels: a bob that was to move by less may look like a copy
+STRAIGHT = 0.005  # of a path's length by which a lens may bend a straight one
 SURE = 0.02  # of the length by which the pivot may be unsure
 
 
@@ -213,6 +214,26 @@ def _wandering(at: NDArray[np.complex128], path: Circle) -> float:
     return off if off > SCATTERS * scatter else 0.0
 
 
+def _check_hanging(
+    film: Film, at: NDArray[np.complex128], path: Circle, scatter: float, unsure: bool
+) -> None:
+    """Refuse a path that is almost straight, or above its centre: no bob hangs so."""
+    along = (path.centre - at.mean()) * 1j
+    chord = float(np.ptp((at * np.conj(along / abs(along))).real))
+    bend = chord**2 / (8 * path.radius)
+    if chord < path.radius and max(bend, scatter) < STRAIGHT * chord:
+        raise TrackError(
+            f"{film.path}: the bob's path is almost straight: it bends by {bend:.1f} of {chord:.0f} pixels, "
+            "as a lens bends a line. What rolls or slides is no pendulum; for a pendulum give pivot=(u, v)"
+        )
+    if not unsure and ((at - path.centre).imag < 0).all():  # v goes down
+        raise TrackError(
+            f"{film.path}: the bob stays above the centre of its path, ({path.centre.real:.0f}, "
+            f"{path.centre.imag:.0f}), so it does not hang there: turn the film if it is upside down, or "
+            "give pivot=(u, v)"
+        )
+
+
 def _pendulum(
     film: Film, bob: BobPath, options: TrackOptions, noise: float, camera: CameraMotion | None
 ) -> Measurement:
@@ -224,6 +245,8 @@ def _pendulum(
     off = 1.48 * float(np.median(np.abs(path.rest - np.median(path.rest))))
     wanders = _wandering(at[seen], path)
     unsure = options.pivot is None and path.sigma[0] > SURE * path.radius
+    if options.pivot is None:
+        _check_hanging(film, at[seen], path, off, unsure)
     if off > ROUND * path.radius or wanders > (0.0 if unsure else WANDERS * path.radius):
         off = max(off, wanders)
         raise TrackError(

@@ -18,6 +18,7 @@ from udd.tracking.calibration.scale import REACH
 from udd.tracking.detection.candidates import colours_of
 from udd.tracking.detection.colour_blobs import Sight
 from udd.tracking.detection.colour_mixing import mixed
+from udd.tracking.detection.evidence import shown
 from udd.tracking.detection.illumination import evenness
 from udd.tracking.detection.occluder import visible
 from udd.tracking.detection.survey import Moving, Survey, moving, repeats_last
@@ -125,7 +126,12 @@ def prepare(
         if align(picture.y, view, look, pose, motion, [0.5, *[MISFIT] * 4], gain_slack=0.3) is not None:
             sharp.append((picture, pose, motion))
     if not sharp:
-        raise TrackError(f"{film.path}: the marks are found but never sharp enough to be measured")
+        first, sight = seen[0]
+        raise TrackError(
+            f"{film.path}: what has the marks' colours, at ({sight.centre.real:.0f}, "
+            f"{sight.centre.imag:.0f}) in frame {first.index}, has no sharp edges of marks; "
+            f"{shown(look_over.pictures, options)}"
+        )
     rim = _rim(film, sharp, look, view, options)
     if rim is not None:
         look = replace(look, rim=rim.radius - RIM_SMEAR)

@@ -115,8 +115,9 @@ def follow_tags(
     points = np.array(seen).reshape(-1, len(body))
     if np.isfinite(points).any(axis=1).sum() < FEWEST:
         raise TrackError(
-            f"{film.path}: none of the tags was found in more than {np.isfinite(points).any(axis=1).sum()} "
-            f"of {len(points)} frames; at least {FEWEST} are needed"
+            f"{film.path}: the layout's tags are read in {np.isfinite(points).any(axis=1).sum()} of "
+            f"{len(points)} frames; at least {FEWEST} are needed. Show the whole tag with its white margin, "
+            "sharp; check its dictionary and number"
         )
     return _laid(points, notes, film, options, shape)
 
