@@ -300,10 +300,9 @@ def test_unit_information_has_a_covariance():
         covariance=np.ones((2, 2)),
         widened=1.0,
         observations=99,
-        level=4,
-        problem=SimpleNamespace(schedule=range(5)),
+        problem=SimpleNamespace(has_smallest_model_error=True),
     )
     assert log_evidence(fit, ["a", "b"]) == -math.inf
     assert hypotheses.log_evidence(fit, []) == 5.0
-    fit.level = 3
+    fit.problem.has_smallest_model_error = False
     assert hypotheses.log_evidence(fit, []) == 5.0 - EVIDENCE_MARGIN  # a random force

@@ -47,9 +47,6 @@ class Table(Acceptance):
     def worse(self, _before: Any, _after: Any) -> bool:
         return False
 
-    def _in_other_widths(self, _current: Any, tried: Any, _scanned: Any) -> Any:
-        return tried
-
     def _alternatives(self, *_arguments: Any) -> list[Any]:
         return []
 

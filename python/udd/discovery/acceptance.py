@@ -27,7 +27,6 @@ from udd.errors import FitError
 from udd.fitting import (
     Fit,
     Record,
-    at_level,
     eased,
     far_off,
     most_probable,
@@ -42,7 +41,7 @@ from .results import Alternative
 from .score_rounds import ScoreRound
 from .thresholds import ALPHA, Confirmation
 from .time_budget import Clock
-from .trial_fits import TrialFit, fitted_ones, from_none, needed_in, of_curve, of_formula, of_library
+from .trial_fits import TrialFit, fitted_ones, needed_in, of_curve, of_formula, of_library
 
 _WORSE = 1.1  # lower end of the errors' ratio at some horizon, above which an effect is rejected
 _DRIFT = 0.7  # share of an effect's gain above which a sensor's drift, with the motion fixed, may explain it
@@ -227,8 +226,8 @@ class Acceptance:
         order = named(ranked(self.hypotheses(current, trials, scores)), self.known_parameters)
         most = max((h.log_z for h in order), default=0.0)
         for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
-            trial = self._in_other_widths(current, chosen.trial, scores.library)
-            judged = self.judged(current, trial, scores, chosen.again if trial is chosen.trial else None)
+            trial = chosen.trial
+            judged = self.judged(current, trial, scores, chosen.again)
             if judged is None:
                 continue
             if judged.witness is None:
@@ -341,31 +340,6 @@ class Acceptance:
             return formulas
         power = power_for(curve, number, taken)
         return [*formulas, power] if power is not None else formulas
-
-    def _in_other_widths(self, current: SearchState, trial: TrialFit, scanned: Scan) -> TrialFit:
-        """Fit several effects at once with all widths of smoothed signs: a fit may be stuck at one width.
-
-        Around a model that lacks two effects, the width with the best score may be far from the fitted one.
-        """
-        if len(trial.candidates) < 2:
-            return trial
-        groups = [
-            [other if c is replaced else c for c in trial.candidates]
-            for replaced in trial.candidates
-            for other in (s.candidate for s in scanned.scored)
-            if other.title == replaced.title and other is not replaced
-        ]
-        refitted = fitted_ones(self.clock.each(lambda group: from_none(current.part, group), groups))
-        level = trial.fit.level
-        some = [trial, *(t for t in refitted if t.fit.level >= level and t.needed)]
-
-        def chi2(other_trial: TrialFit) -> float:  # at the same model error
-            try:
-                return at_level(other_trial.fit, level).chi2
-            except FitError:
-                return math.inf
-
-        return min(some, key=chi2)
 
     def all_are_free(self, fitted: Fit) -> bool:
         """Return True if all of the user's free parameters are free; at a search's start some may not be."""

@@ -42,7 +42,7 @@ def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
         Parameters that the hypothesis adds to the known model, without an explicit prior.
     """
     # Without this cost a cubic drag with a larger model error leads where a power explains more.
-    evidence = fitted.evidence - EVIDENCE_MARGIN * (fitted.level < len(fitted.problem.schedule) - 1)
+    evidence = fitted.evidence - EVIDENCE_MARGIN * (not fitted.problem.has_smallest_model_error)
     if not names:
         return evidence
     order = list(fitted.parameters)

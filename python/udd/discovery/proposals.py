@@ -154,7 +154,7 @@ class Proposals:
         """Fit two effects at once, the best-scored ones, as rivals of single effects and formulas.
 
         An effect that drives instead of braking may only compensate another one that brakes too much. A pair
-        that explains less than one of the `singles` is abandoned.
+        that is ten nats behind one of the `singles` is abandoned.
         """
         scored = sorted((s for s in self.scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
@@ -186,7 +186,9 @@ class Proposals:
 
     def _together(self, groups: list[list[Candidate]], singles: Sequence[TrialFit] = ()) -> list[TrialFit]:
         """Fit several effects at once, each group starting at the end of the best of its `singles`."""
-        goal = Goal(self.fit.level, min((t.fit.chi2 for t in singles), default=np.inf))
+        # Without the margin a power hides quadratic and cubic drag, which explain almost as much.
+        least = min((t.fit.chi2 for t in singles), default=np.inf)
+        goal = Goal(self.fit.level, least + 2 * EVIDENCE_MARGIN)
         starts = sorted((t for t in singles if t.curve is None), key=lambda t: t.fit.chi2)
 
         def together(group: list[Candidate]) -> TrialFit | None:
@@ -196,4 +198,20 @@ class Proposals:
             return with_more(self.fit, first, group, goal)
 
         self.clock.trying([" with ".join(c.title for c in group) for group in groups])
-        return fitted_ones(self.clock.each(together, groups))
+        trials = fitted_ones(self.clock.each(together, groups))
+        best = min(trials, key=lambda t: t.rank, default=None)
+        return trials + self._in_other_widths(best) if best else []
+
+    def _in_other_widths(self, trial: TrialFit) -> list[TrialFit]:
+        """Fit several effects at once with the other widths of their smoothed signs.
+
+        Around a model that lacks two effects, the width with the best score may be far from the right one.
+        """
+        # Without this a curve over its speed replaces an arm's offset and dry friction.
+        groups = [
+            [other if c is replaced else c for c in trial.candidates]
+            for replaced in trial.candidates
+            for other in (s.candidate for s in self.scores.library.scored)
+            if other.title == replaced.title and other is not replaced
+        ]
+        return fitted_ones(self.clock.each(lambda group: from_none(self.fit, group), groups))

@@ -97,7 +97,7 @@ def reduce_model_error(
             break
         best, point = result, result.point
         _give_up_above(goal, best)
-    if _is_last(best.problem) or best.level < goal.level or _explains_little(best, goal):
+    if best.problem.has_smallest_model_error or best.level < goal.level or _explains_little(best, goal):
         return best
     return _settled(best, schedule, steps)
 
@@ -147,14 +147,9 @@ def _nearly(fitted: Fit, steps: int) -> Fit:
     return continued if continued.converged else fitted
 
 
-def _is_last(problem: Problem) -> bool:
-    """Return True if the model error is the smallest of the schedule."""
-    return problem.diffusion == problem.schedule[-1]
-
-
 def _enough(problem: Problem) -> float:
     """Return the decrease of chi2 at which a fit stops: the final one at the last level."""
-    return DONE if _is_last(problem) else ROUGH
+    return DONE if problem.has_smallest_model_error else ROUGH
 
 
 def _stands(tighter: Fit, looser: Fit) -> bool:
@@ -216,7 +211,7 @@ def with_negligible_model_error(fitted: Fit) -> Fit:
     larger model error stays as it is: its model lacks something.
     """
     # Without this the standard errors of a chaotic disk are 1.5 times too large.
-    if not (fitted.converged and _is_last(fitted.problem)):
+    if not (fitted.converged and fitted.problem.has_smallest_model_error):
         return fitted
     limit = tuple(_NEGLIGIBLE * q for q in fitted.problem.diffusion)
     try:

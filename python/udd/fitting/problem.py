@@ -64,6 +64,11 @@ class Problem(OneLine):
     diffusion: tuple[float, ...]
     likeliest: bool = True
 
+    @property
+    def has_smallest_model_error(self) -> bool:
+        """True at the last level of the schedule, which a right model reaches."""
+        return self.diffusion == self.schedule[-1]
+
     def with_model_error(self, diffusion: tuple[float, ...]) -> Problem:
         """Return the problem with another model error, per square root of a second."""
         return replace(self, diffusion=diffusion)

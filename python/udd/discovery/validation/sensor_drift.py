@@ -89,7 +89,7 @@ def as_random(before: Fit, after: Fit) -> Fit | None:
     if after.model.profile.sensor.sees_marks:
         return None
     most_probable = eased(after)
-    tight = most_probable.level == len(most_probable.problem.schedule) - 1
+    tight = most_probable.problem.has_smallest_model_error
     if tight or most_probable.evidence - eased(before).evidence > EVIDENCE_MARGIN:
         return None
     return most_probable
