@@ -122,8 +122,9 @@ def test_a_missed_tolerance_warns() -> None:
         udd.lyapunov(1.0, t=500.0, tol=1e-6)
     with pytest.warns(ConvergenceWarning, match="2 of 2 exponents"):
         udd.lyapunov([1.0, 2.0], t=500.0, tol=1e-6)
-    with pytest.warns(ConvergenceWarning, match="up to inf, above"):  # no two blocks
+    with pytest.warns(ConvergenceWarning, match="up to inf, above") as said:  # no two blocks
         udd.lyapunov(1.0, t=1.0)
+    assert said[0].filename == __file__  # the line of the caller, not one of the package
 
 
 def test_a_met_tolerance_does_not_warn() -> None:

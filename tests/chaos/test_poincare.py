@@ -307,3 +307,7 @@ def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None
     ):
         assert main(wrong) == 1
         assert message in capsys.readouterr().err
+
+
+def test_an_equation_is_shown_as_it_was_written() -> None:
+    assert repr(udd.poincare(udd.DLE(3.0), "z = 0.5", 3)).startswith("<Section z = 0.5 (up) of DLE")

@@ -13,7 +13,7 @@ from udd import _core
 from udd._util.arguments import checked_arguments
 from udd._util.progress import progress_bar, thread_count
 from udd._util.validation import number
-from udd.errors import ConvergenceWarning, IntegrationError, ModelError
+from udd.errors import ConvergenceWarning, IntegrationError, ModelError, outside
 from udd.models import DLE, Model
 from udd.models.parameter_batch import default_state, parameter_batch
 from udd.simulation.batch import Batch
@@ -219,7 +219,7 @@ def lyapunov(
             f"{which} a standard error up to {worst:.2g}, above tol = {goal:g}; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
-            stacklevel=2,
+            stacklevel=outside(),
         )
     if shape == ():
         return (float(exponents[0]), float(errors[0])) if with_error else float(exponents[0])
@@ -244,7 +244,7 @@ def _tell(outcomes: list[int], n: int, single: bool, failure: str | None) -> Non
     warnings.warn(
         f"{len(outcomes)} of {n} orbits have no exponent ({list_}) and are NaN",
         ConvergenceWarning,
-        stacklevel=3,
+        stacklevel=outside(),
     )
 
 

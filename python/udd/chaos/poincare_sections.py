@@ -18,7 +18,7 @@ from udd._util.keywords import with_defaults
 from udd._util.labelled import axes, of_states
 from udd._util.progress import progress_bar, thread_count
 from udd._util.validation import number, whole
-from udd.errors import IncompleteWarning, ModelError, interrupted
+from udd.errors import IncompleteWarning, ModelError, interrupted, outside
 from udd.models import Model, require_model
 from udd.models.parameter_batch import orbits_of
 from udd.simulation.batch import RUN_OPTIONS, Batch, RunOptions
@@ -233,7 +233,8 @@ class Section(Drawable):
             raise ModelError(f"{what} is that of one surface: choose one of {len(self.section)} by .of(k)")
 
     def __repr__(self) -> str:
-        what = " and ".join(f"{s} = 0 ({d})" for s, d in zip(self.section, self.direction, strict=True))
+        laws = [text if "=" in text else f"{text} = 0" for text in self.section]
+        what = " and ".join(f"{law} ({d})" for law, d in zip(laws, self.direction, strict=True))
         if self.t.ndim == 1:
             return (
                 f"<Section {what} of {self.model!r}: {self.found} points, residual {self.residual:.1e}, "
@@ -484,4 +485,4 @@ def _tell(
     if (outcome == OUTCOMES.index("interrupted")).any():
         interrupted(lambda: section, message, partial)
     else:
-        warnings.warn(IncompleteWarning(message), stacklevel=3)
+        warnings.warn(IncompleteWarning(message), stacklevel=outside())

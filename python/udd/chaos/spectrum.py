@@ -18,7 +18,7 @@ from udd._util.memory import require_memory
 from udd._util.one_line import OneLine
 from udd._util.validation import number, whole
 from udd._util.value_text import with_error
-from udd.errors import ConvergenceWarning, IntegrationError
+from udd.errors import ConvergenceWarning, IntegrationError, outside
 from udd.models import DLE, Model, require_model
 from udd.models.parameter_batch import default_state
 from udd.simulation.batch import Batch
@@ -267,14 +267,14 @@ def lyapunov_spectrum(
             f"the motion still settles after t = {spent + fate.t:g}: these are no exponents of its end; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
-            stacklevel=2,
+            stacklevel=outside(),
         )
     elif not converged and fate.kind != "escapes":
         warnings.warn(
             f"the largest exponent has a standard error of {errors[0]:.2g}, above tol = {goal:g}; "
             f"a longer t (now {time:g}) would help",
             ConvergenceWarning,
-            stacklevel=2,
+            stacklevel=outside(),
         )
     if fate.kind not in ("equilibrium", "escapes"):
         warn_from(model, orbits["end"][0], 0.0, min(time, LOOK * time_scale), rtol, atol)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from udd._util.arguments import checked_arguments
 from udd._util.input_files import LARGEST, MemoryLimit, read_regular
-from udd.errors import MeasurementError
+from udd.errors import MeasurementError, outside
 
 from .formats import HEAD, Table, format_of
 from .formats.headings import Heading
@@ -134,10 +134,10 @@ def read_measurement(
     except MeasurementError as error:
         raise MeasurementError(f"{source}: {error}") from None
     for kept in frames.kept:
-        warnings.warn(f"{source}: {kept}", stacklevel=2)
+        warnings.warn(f"{source}: {kept}", stacklevel=outside())
     if frames.converted:
         changes = ", ".join(f"{name} from {units}" for name, units in frames.converted.items())
-        warnings.warn(f"{source}: converted {changes}, as its columns say", stacklevel=2)
+        warnings.warn(f"{source}: converted {changes}, as its columns say", stacklevel=outside())
     return m
 
 

@@ -16,7 +16,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.labelled import of_states
 from udd._util.validation import array, number
-from udd.errors import IncompleteWarning, ModelError
+from udd.errors import IncompleteWarning, ModelError, outside
 from udd.models import Model, require_model
 
 from .below_tolerance import warn_of
@@ -388,7 +388,7 @@ def simulate(
             f"the disk left the wheels at t = {trajectory.t[-1]:.6g} s, where the run ends; a disk with "
             'edge="ignore" goes on by the equations alone, beyond where they hold',
             IncompleteWarning,
-            stacklevel=2,
+            stacklevel=outside(),
         )
     warn_of(trajectory.model, trajectory.t, trajectory.state, *tolerances(rtol, atol))
     return trajectory

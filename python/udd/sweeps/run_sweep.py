@@ -12,7 +12,7 @@ import numpy as np
 
 from udd._util.arguments import checked_arguments
 from udd._util.progress import progress_bar
-from udd.errors import IncompleteWarning, ModelError, interrupted
+from udd.errors import IncompleteWarning, ModelError, interrupted, outside
 
 from .chunks import grid_of
 from .executors import ChunksLost, Executor, here, spread
@@ -145,7 +145,7 @@ def sweep(
         if stopped:
             interrupted(result.dataset, message, partial)
         else:
-            warnings.warn(IncompleteWarning(message), stacklevel=2)
+            warnings.warn(IncompleteWarning(message), stacklevel=outside())
     else:
         result.tidy()
     return result.dataset()

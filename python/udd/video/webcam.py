@@ -21,6 +21,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.one_line import link_to
 from udd._util.progress import Progress, progress_bar
 from udd._util.validation import number
+from udd.errors import outside
 
 from .reader import TrackError
 from .writer import checked_path, require_video, write_film
@@ -193,7 +194,7 @@ def record(
         source.release()
     made = Recording(target, np.array(shots.t) - shots.t[0], shots.clock)
     if not by_hand.asked and made.t[-1] < seconds - max(1.0, 2 * LATE * made.interval):
-        warnings.warn(f"{name} stopped after {made.t[-1]:.1f} of {seconds:g} s", stacklevel=2)
+        warnings.warn(f"{name} stopped after {made.t[-1]:.1f} of {seconds:g} s", stacklevel=outside())
     return made
 
 
