@@ -98,6 +98,11 @@ def test_a_file_that_cannot_be_used_gets_one_sentence(client: TestClient, conten
             'no header names the columns: say what they are, for example columns="t,theta,_"',
             "No header names the columns: say what they are.",
         ),
+        (
+            "the contact is not determined: give pivot=(u, v) in pixels",
+            "The contact is not determined: click the contact.",
+        ),
+        ("show all marks, or give your own (layout)", "Show all marks, or give your own."),
         ("W is 4.2 m/s (expected 0.042): is it in cm/s?", "W is 4.2 m/s (expected 0.042): is it in cm/s?"),
     ],
 )

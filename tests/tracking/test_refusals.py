@@ -55,8 +55,8 @@ def notes_on_the_wall(wall: Picture, k: int) -> None:
     [
         (nothing, 1.0, "no frame has a patch in any of these colours"),
         (nothing, 0.1, "the film is dark"),
-        (a_blue_coat, 1.0, "red in 0, orange in 0, blue in 14, green in 0: say the disk's own marks"),
-        (notes_on_the_wall, 1.0, "red in 14, orange in 14, blue in 14, green in 14, but never as on a disk"),
+        (a_blue_coat, 1.0, "red 0, orange 0, blue 14, green 0; show all of the marks"),
+        (notes_on_the_wall, 1.0, "red 14, orange 14, blue 14, green 14, but never as on a disk"),
     ],
 )
 def test_a_film_without_a_disk_says_what_was_seen(

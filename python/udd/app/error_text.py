@@ -10,6 +10,8 @@ import re
 def sentence(error: object) -> str:
     """Return what is wrong with a capital and a full stop, without advice to callers from Python."""
     text = _python_advice().sub("", " ".join(str(error).split()))
+    text = re.sub(r"give pivot=\(u, v\)( in pixels)?", "click the contact", text)
+    text = re.sub(r" \((layout|region)\)", "", text)
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
 
 

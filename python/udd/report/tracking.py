@@ -45,6 +45,13 @@ FRAMES = 6  # of the film
 WIDTH = 300  # pixels of each
 FEWEST = 4  # marks in a part of the picture
 BINS = 24  # along the picture's longer side
+GUIDE = (
+    ("Standard error", "The true value lies within one standard error in 68 of 100 such cases."),
+    ("Flag", "Why a frame holds no position, or a remark on the position that it holds."),
+    ("Residual", "The distance in pixels by which the film and the fitted position differ."),
+    ("Contact", "The place in the picture where the wheels hold the disk; positions count from it."),
+    ("Rolling", "At the contact the disk moves like the wheels' rims, without slip."),
+)
 _SHORT = {"Y": "Y", "Z": "Z", "beta": "β", "theta": "θ"}
 
 
@@ -69,7 +76,8 @@ def write_tracked(
     sections = [_measured(video, m), _calibrated(m), _each_frame(m, detail)]
     if marks:
         sections.append(_rolls(checked))
-    write_page(Report(_head(m, checked), tuple(sections), identity(video), command), path)
+    report = Report(_head(m, checked), tuple(sections), identity(video), command)
+    write_page(report, path, guide=GUIDE if marks else GUIDE[:3])
 
 
 def _head(m: Measurement, checked: Health | None) -> Head:
@@ -158,7 +166,7 @@ def _rolls(checked: Health | None) -> Section:
         "At the contact the disk turns about one point while the wheels drive it past that point: "
         f"dY/dT = Z Ω, dZ/dT = −Y Ω + W. Over stretches of 1.5 s the violation is {left} r.m.s.; the noise "
         f"of the frames alone would give {noise}. A much larger value points to slip, a wrong clock, a wrong "
-        "camera model, or a slightly different law."
+        "camera model, or a slightly different law, for which udd discover searches."
     )
     caption = "Violation of the rolling constraint, with a band of two standard errors of the frames' noise."
     return Section("Does it roll?", (Paragraph(said), Figure(rolling(checked), caption)))
@@ -189,7 +197,7 @@ def numbers(m: Measurement, checked: Health | None) -> tuple[Number, ...]:
         out.append(Number(f"drive {drive}, as it is seen", said, error))
     if checked is not None:
         noise = f"noise alone: {wording.length(checked.noise, 'm')}"
-        out.append(Number("left of the rolling constraint", wording.length(checked.rms, "m"), noise))
+        out.append(Number("departure from rolling", wording.length(checked.rms, "m"), noise))
     return tuple(out)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -238,8 +238,10 @@ def run_tracker(
     if options.clicks is not None:
         options = with_clicks(film, options, options.clicks)
     if options.bob is not None:
+        with _looking_over(film, progress):
+            look_over, camera = steadied(film, survey(film))
         with _bar(film, film.packets, "track", progress) as bar:
-            return track_bob(film, options, lambda _: bar.update())
+            return track_bob(film, look_over, camera, options, lambda _: bar.update())
     if options.tags:
         return _track_tags(film, options, progress, watch)
     return _track_marks(film, options, progress, watch)
@@ -294,9 +296,21 @@ def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractCont
     return progress_bar(frames, "frame", progress, title=f"{verb} {film.path.name}", leave=True)
 
 
+@contextmanager
+def _looking_over(film: Film, progress: Progress) -> Iterator[None]:
+    """Show how much of a film is read before it is tracked: once for a survey, once for the camera."""
+    with _bar(film, 2 * film.packets, "look over", progress) as bar:
+        film.tick = bar.update
+        try:
+            yield
+        finally:
+            film.tick = lambda: None
+
+
 def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: Watch | None) -> Tracking:
     """Track coloured marks: survey, calibrate, follow, refine, convert to metres, flag."""
-    look_over, camera = steadied(film, survey(film))
+    with _looking_over(film, progress):
+        look_over, camera = steadied(film, survey(film))
     result = _measured(film, look_over, camera, options, progress, watch)
     if _retimed(film, result):
         result = _measured(film, survey(film), camera, options, progress, watch)

@@ -162,6 +162,7 @@ class Film:
             self.clock_note = f"times by the tag com.android.capture.fps: {captured:g} frames per second"
             self.fps = float(captured)
         self.correct: Callable[[Picture], Picture] | None = None  # what is done to each picture
+        self.tick: Callable[[], object] = lambda: None  # called for each picture that is read
         self.left_out: tuple[tuple[int, int], ...] = ()  # first and last frames of the parts without use
 
     @property
@@ -202,6 +203,7 @@ class Film:
                     picture = replace(picture, t=real_time(picture.t, self.slower))
                 if any(first <= picture.index <= last for first, last in self.left_out):
                     picture = replace(picture, damaged=True, left_out=True)
+                self.tick()
                 yield picture if self.correct is None else self.correct(picture)
             self.broken = decoder.broken
         finally:

@@ -210,6 +210,7 @@ export class Loop {
     if (job !== this.job || !$("failed").textContent) return;
     const words = Object.fromEntries(Object.keys(WORDS).map((name) => [name, t(`clicks_${name}`)]));
     $("refused").hidden = false;
+    $("failed").scrollIntoView();
     this.clicks = new Clicks(document.querySelector("#refused .clicks"), data, words, ({ problem, empty }) => {
       $("track-again").disabled = Boolean(problem) || empty;
     });

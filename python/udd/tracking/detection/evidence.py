@@ -29,10 +29,10 @@ def shown(pictures: Sequence[Picture], options: TrackOptions) -> str:
         counts += [len(blob.centre) > 0 for blob in blobs]
     where = "" if options.region is None else " in the region"
     if not counts.any():
-        return f"no frame has a patch in any of these colours{where}: say the disk's own marks (layout)"
+        return f"no frame has a patch in any of these colours{where}: give the disk's own marks (layout)"
     names = COLOURS if options.layout.standard else [f"mark {k + 1}" for k in range(len(counts))]
-    seen = ", ".join(f"{name} in {n}" for name, n in zip(names, counts, strict=True))
-    what = f"of {len(some)} frames, patches{where} are {seen}"
+    seen = ", ".join(f"{name} {n}" for name, n in zip(names, counts, strict=True))
+    what = f"patches{where} by colour, in {len(some)} frames: {seen}"
     if counts.min() < len(some) / 2:
-        return f"{what}: say the disk's own marks (layout), or show all of them"
-    return f"{what}, but never as on a disk: say the disk's own marks (layout), or where it is (region)"
+        return f"{what}; show all of the marks, or give the disk's own (layout)"
+    return f"{what}, but never as on a disk; give the disk's own marks (layout), or where it is (region)"

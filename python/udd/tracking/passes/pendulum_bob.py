@@ -14,9 +14,9 @@ from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.correction import applied
 from udd.tracking.detection.bob import Background, Blob, BobColour, bob_colour, locate_bob, usual_area
-from udd.tracking.detection.camera_motion import CameraMotion, steadied
+from udd.tracking.detection.camera_motion import CameraMotion
 from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, is_copy, lost, unread
-from udd.tracking.detection.survey import survey
+from udd.tracking.detection.survey import Survey
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
@@ -49,7 +49,13 @@ class Circle:
     rest: Array
 
 
-def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], object]) -> Measurement:
+def track_bob(
+    film: Film,
+    look_over: Survey,
+    camera: CameraMotion | None,
+    options: TrackOptions,
+    tick: Callable[[Picture], object],
+) -> Measurement:
     """Measure the pendulum's angle in each frame; the options' layout holds the colours of one bob or two.
 
     Raises
@@ -57,7 +63,6 @@ def track_bob(film: Film, options: TrackOptions, tick: Callable[[Picture], objec
     TrackError
         No bob of that colour moves in the film, or its path does not show the pivot.
     """
-    look_over, camera = steadied(film, survey(film))
     some = [burst[0] for burst in look_over.bursts if not burst[0].damaged]
     behind = Background.of(some, options.view(some[0].y.shape), film.full_range)
     bobs = []
