@@ -29,6 +29,9 @@ def test_dark_and_projector_are_kept_over_a_reload(opened: Opened) -> None:
     until(page, "globalThis.udd?.stats.frames > 3")
     assert page.evaluate("document.documentElement.dataset.theme") == "dark"
     assert page.evaluate("document.body.classList.contains('projector')")
+    # Large enough to read: its height was 45 px.
+    page.click("#tab-diagram")
+    until(page, "document.getElementById('diagram').clientHeight > 120")
     assert axe.Axe().run(page).violations_count == 0
 
 
