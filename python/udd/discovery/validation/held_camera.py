@@ -1,23 +1,20 @@
-"""Test whether a camera that was assumed to be perfect would explain the effects."""
+"""Compare the effects with a camera that was assumed to be perfect, by the log evidence."""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 
-from udd._util import chi_squared
-from udd.discovery.thresholds import ALPHA
+from udd.discovery.hypotheses import log_evidence
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.errors import FitError
-from udd.fitting import Fit, extend, ran_away, released, with_noise_of
+from udd.fitting import Fit, extend, most_probable, ran_away, released
 from udd.fitting.parameters import Free, free_parameters
 from udd.fitting.sensor import is_encoder
 
-from .confirmation import same_level
-
-_MOST = 0.5  # ratio of chi2 with a free camera, below which a form found without it is unreliable
-
 
 def camera_shows(base: Fit, extended: Fit) -> list[str] | None:
-    """Test whether the residuals of a model with effects show a fixed camera's errors; None if they do not.
+    """Test whether a fixed camera's errors are a rival of the effects; None if they are not.
 
     Parameters
     ----------
@@ -27,8 +24,9 @@ def camera_shows(base: Fit, extended: Fit) -> list[str] | None:
     Returns
     -------
     list of str or None
-        Names of the effects that are not needed once the camera's parameters are free: the camera then
-        explains the data better than they did. Empty if that is only possible, as with a formula.
+        Names of the effects that are not needed once the camera's parameters are free: the other effects with
+        a free camera are at most ten nats behind. Empty if all effects with a free camera are more than ten
+        nats ahead, or if one is a formula, which may imitate the camera's errors.
     """
     camera_parameters = _fixed(base)
     there = {e.name for e in base.model.effects}
@@ -36,19 +34,23 @@ def camera_shows(base: Fit, extended: Fit) -> list[str] | None:
     if not camera_parameters or not effects:
         return None
     names = [e.name for e in effects]
-    camera_alone = _freed(with_noise_of(base, extended), camera_parameters)
+    log_z = _log_z(extended, names)
+    free = _freed(base, camera_parameters)
     for kept in (some for size in range(len(names)) for some in itertools.combinations(names, size)):
-        if camera_alone is not None and _explains(camera_alone, extended, kept):
+        if _log_z(_with_effects(free, extended, kept), kept) > log_z - EVIDENCE_MARGIN:
             return [name for name in names if name not in kept]
-    if any(e.made for e in effects):  # a formula may imitate the camera's errors
-        return []
-    freed = _freed(extended, camera_parameters)
-    if freed is None:
-        return None
-    before, after = same_level(extended, freed)
-    fall = (before.chi2 - after.chi2) / after.inflation(before)
-    shows = after.chi2 < _MOST * before.chi2 and chi_squared.sf(fall, len(camera_parameters)) < ALPHA
-    return [] if shows else None
+    is_formula = any(e.made for e in effects)
+    all_free = None if is_formula else _freed(extended, camera_parameters)
+    return [] if is_formula or _log_z(all_free, names) > log_z + EVIDENCE_MARGIN else None
+
+
+def _log_z(fitted: Fit | None, effects: Iterable[str]) -> float:
+    """Compute the log evidence of a fit with these effects at its most probable noise and model error."""
+    if fitted is None:
+        return float("-inf")
+    model = {e.name: e for e in fitted.model.effects}
+    names = [f"{name}.{p}" for name in effects for p in model[name].amplitudes]
+    return log_evidence(most_probable(fitted), [name for name in names if name in fitted.parameters])
 
 
 def _fixed(fit: Fit) -> tuple[Free, ...]:
@@ -68,13 +70,15 @@ def _freed(fitted: Fit, more: tuple[Free, ...]) -> Fit | None:
     return freed if freed.converged and not ran_away(freed) else None
 
 
-def _explains(alone: Fit, full: Fit, kept: tuple[str, ...]) -> bool:
-    """Return True if some of the effects and a free camera fit better than all effects without one."""
-    effects = [e for e in full.model.effects if e.name in kept]
-    values = [full.parameters.get(f"{e.name}.{p}", e.parameters[p]) for e in effects for p in e.amplitudes]
+def _with_effects(fitted: Fit | None, extended: Fit, kept: tuple[str, ...]) -> Fit | None:
+    """Extend a fit by some of the effects, which start at their fitted amplitudes; None if that fails."""
+    effects = [e for e in extended.model.effects if e.name in kept]
+    if fitted is None or not effects:
+        return fitted
+    values = [
+        extended.parameters.get(f"{e.name}.{p}", e.parameters[p]) for e in effects for p in e.amplitudes
+    ]
     try:
-        some = extend(alone, effects, values) if effects else alone
+        return extend(fitted, effects, values)
     except FitError:
-        return False
-    partial, complete = same_level(some, full)
-    return partial.chi2 < complete.chi2
+        return None
