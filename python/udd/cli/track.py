@@ -177,7 +177,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     try:
         m = _tracked(args, options, detail).with_meta(**header)
     except UddError as error:
-        _explain(args, options, str(error))
+        _explain(args, options, error)
         if args.click is None:
             raise
         raise UddError(f"{error} ({said.strip()})") from None
@@ -214,17 +214,20 @@ def _of_pictures(folder: Path) -> bool:
     return bool(images_in(str(folder))) and not any(is_film(file) for file in folder.iterdir())
 
 
-def _explain(args: argparse.Namespace, options: dict[str, Any], reason: str) -> Path | None:
-    """Write the page of a film that is refused."""
+def _explain(args: argparse.Namespace, options: dict[str, Any], error: UddError) -> Path | None:
+    """Write the page of a film that the tracker refuses."""
     from udd.report.refused_film import write_refused
+    from udd.video.reader import TrackError
 
+    if not isinstance(error, TrackError):  # such as a file that is cut off
+        return None
     page = args.page
     if page is None:  # where the table would be
         out = Path() if args.out is None else args.out
         page = (out if args.out is None or out.is_dir() else out.parent) / f"{args.file.stem}-refused.html"
     given = {"disk_radius": args.disk_radius, **options}
     commands = _command(args), _command(args, without=("pivot", "region", "fps", "leave_out", "clicks"))
-    if not write_refused(args.file, reason, page, given=given, commands=commands):
+    if not write_refused(args.file, str(error), page, given=given, commands=commands):
         return None
     print(f"udd: written: {page}; open it to see the frames and to click what you know", file=sys.stderr)
     return Path(page)
@@ -424,7 +427,7 @@ def _folder(args: argparse.Namespace) -> CommandResult:
         except UddError as error:
             failed += 1
             lines.append(f"{film.name}: {error}")
-            page = _explain(args, options, str(error))
+            page = _explain(args, options, error)
             rows.append({"film": film.name, "error": str(error), **({} if page is None else {"page": page})})
             continue
         table = args.out / f"{film.stem}.csv"

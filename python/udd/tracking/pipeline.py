@@ -298,7 +298,7 @@ def _bar(film: Film, frames: int, verb: str, progress: Progress) -> AbstractCont
 
 @contextmanager
 def _looking_over(film: Film, progress: Progress) -> Iterator[None]:
-    """Show how much of a film is read before it is tracked: once for a survey, once for the camera."""
+    """Show the progress through a film before it is tracked: once for a survey, once for the camera."""
     with _bar(film, 2 * film.packets, "look over", progress) as bar:
         film.tick = bar.update
         try:
