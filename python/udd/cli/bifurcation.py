@@ -40,10 +40,10 @@ def add(commands: Any) -> None:
             "udd bifurcation mu --model own.json --from 0.5 --to 2 --n 8 --section x",
         ),
     )
-    parser.add_argument("parameter", help="what is varied, such as w, W or relaxation.b")
+    parser.add_argument("parameter", help="parameter to vary, such as w, W or relaxation.b")
     parser.add_argument("--from", dest="first", type=float, required=True, help="first value")
     parser.add_argument("--to", dest="last", type=float, required=True, help="last value")
-    parser.add_argument("--n", type=int, default=200, help="how many values (default 200)")
+    parser.add_argument("--n", type=int, default=200, help="number of values (default 200)")
     parser.add_argument(
         "--path",
         choices=("independent", "up", "down", "both"),

@@ -37,13 +37,13 @@ def add(commands: Any) -> None:
             "udd continuation w --from 5.9 --to 6.1 --at 6 --state 0.72665,-8.82437,0 --crises",
         ),
     )
-    parser.add_argument("parameter", help="what is varied, such as w, W or relaxation.b")
+    parser.add_argument("parameter", help="parameter to vary, such as w, W or relaxation.b")
     parser.add_argument("--from", dest="first", type=float, required=True, help="least value")
     parser.add_argument("--to", dest="last", type=float, required=True, help="largest value")
     parser.add_argument(
         "--at", type=float, help="value at which the start is looked for (default: the middle)"
     )
-    parser.add_argument("--of", choices=("cycle", "equilibria"), default="cycle", help="what is followed")
+    parser.add_argument("--of", choices=("cycle", "equilibria"), default="cycle", help="object to follow")
     parser.add_argument(
         "--state", metavar="X,X,X", help="state near the cycle (default: run until it settles)"
     )
@@ -52,7 +52,11 @@ def add(commands: Any) -> None:
         help="approximate period of the cycle (default: searched), or that of the forcing; may be a formula",
     )
     parser.add_argument(
-        "--born", type=int, default=0, metavar="N", help="follow branches born on the way, N generations"
+        "--born",
+        type=int,
+        default=0,
+        metavar="N",
+        help="follow the branches that begin at bifurcations on the way, N generations",
     )
     parser.add_argument(
         "--cascade", type=int, metavar="N", help="follow N period doublings from the first one on"

@@ -43,7 +43,7 @@ def add(commands: Any) -> None:
         "--budget",
         type=float,
         metavar="SECONDS",
-        help="end the search after so long, with what it has by then",
+        help="end the search after this time, with the result that it has by then",
     )
     parser.add_argument(
         "--report",

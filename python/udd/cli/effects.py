@@ -25,7 +25,7 @@ def add(commands: Any) -> None:
         "List the effects that a model may be given, with equations, parameters and units.",
         ("udd effects", "udd effects relaxation"),
     )
-    parser.add_argument("name", nargs="?", metavar="NAME", help="an effect, with all that is known of it")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="an effect, to be described in full")
 
 
 def run(args: argparse.Namespace) -> CommandResult:

@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> CommandResult:
     from udd.video.writer import checked_path, require_video
 
     if args.W is None:
-        raise UddError("say the drive speed with --W in m/s (--W 0 where the wheels stand still)")
+        raise UddError("give the drive speed with --W in m/s (--W 0 if the wheels stand still)")
     size = re.fullmatch(r"(\d+)[xX](\d+)", args.size)
     if size is None:
         raise UddError(f"--size must be width x height, such as 550x700, not {args.size}")

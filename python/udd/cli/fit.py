@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--uncertainties",
         action="store_true",
-        help="say from what the uncertainty of each number comes: noise, camera, scale, priors, R, g",
+        help="list the sources of the uncertainty of each number: noise, camera, scale, priors, R, g",
     )
 
 

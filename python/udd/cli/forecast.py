@@ -35,7 +35,7 @@ def add(commands: Any) -> None:
         ),
     )
     add_input(parser)
-    parser.add_argument("--t", type=float, help="how far to look ahead [s] (default 10; a pendulum 60)")
+    parser.add_argument("--t", type=float, help="length of the forecast [s] (default 10; a pendulum 60)")
     parser.add_argument(
         "--start",
         type=float,
@@ -53,7 +53,7 @@ def add(commands: Any) -> None:
         type=float,
         help="error up to which the forecast is valid [m, or rad] (default 0.005; a pendulum 0.05)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="another seed, another ensemble (default 0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the ensemble (default 0)")
     add_out(parser, _DATA)
 
 

@@ -56,8 +56,8 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         '{"coordinates": {"x": "v"}, "mass": [["m"]], "forces": ["-k*x"]}, "parameters": {"m": 2.0, "k": '
         '1.0}}; "state0": {"v": 0.1} next to them gives the start of an unobserved state',
     )
-    add_disk(parser, "drive speed [m/s]; 0 where the wheels stand still (wins over the file's header)")
-    add_pendulum(parser, "pivot to centre of mass [m] (wins over the file's header)")
+    add_disk(parser, "drive speed [m/s]; 0 if the wheels stand still (overrides the file's header)")
+    add_pendulum(parser, "pivot to centre of mass [m] (overrides the file's header)")
     parser.add_argument(
         OPTIONS["columns"],
         dest="columns",
@@ -68,7 +68,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         OPTIONS["inputs"],
         dest="inputs",
         metavar="NAMES",
-        help='columns with what drove it, such as "torque" or "u=Motor torque (N m)"',
+        help='columns of the inputs that drive the machine, such as "torque" or "u=Motor torque (N m)"',
     )
     parser.add_argument(
         "--gyroscope",
@@ -83,13 +83,13 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         dest="sampling",
         type=float,
         metavar="HZ",
-        help="samples a second, of a file without times",
+        help="samples per second, for a file without a column of times",
     )
     parser.add_argument(
         OPTIONS["repeated"],
         dest="repeated",
         choices=["first"],
-        help="of rows with the same time keep the first (else: refused)",
+        help="keep the first of several rows with the same time (default: refuse them)",
     )
     parser.add_argument(
         OPTIONS["part"],
@@ -120,7 +120,7 @@ def add_input(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         help="the model's free parameters, such as k0,W; repeatable (default: of a disk k0, k1, k2, W and "
         "effects, of a pendulum k0, length, inertia and effects, of a model of your own all)",
     )
-    parser.add_argument("--no-camera", action="store_true", help="take the camera as faultless")
+    parser.add_argument("--no-camera", action="store_true", help="fit no fault of the camera")
 
 
 def is_film(path: Path) -> bool:
@@ -301,7 +301,7 @@ def model_of(args: argparse.Namespace, measurement: Measurement) -> Model:
     if W is None:
         raise UddError(
             f"the drive speed is in neither the command line nor the header of {args.file}: "
-            "say --W in m/s (--W 0 where the wheels stand still)"
+            "say --W in m/s (--W 0 if the wheels stand still)"
         )
     R = _option_or_header(args, measurement, "R")
     return disk(args, W, 0.08 if R is None else R)
@@ -408,6 +408,6 @@ def _check_device(args: argparse.Namespace) -> None:
         if args.W is None:
             raise UddError(
                 f"the drive speed is not known: say --W in m/s with the film {args.file} "
-                "(--W 0 where the wheels stand still)"
+                "(--W 0 if the wheels stand still)"
             )
         Disk(args.W, R=0.08 if args.R is None else args.R, **given(args, "g"))

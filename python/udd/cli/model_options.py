@@ -100,7 +100,9 @@ def add_runs(parser: argparse.ArgumentParser, points: int) -> None:
         "--transient", type=int, default=points, help=f"points left out before (default {points})"
     )
     parser.add_argument("--section", help="surface, such as z or 'maxima of z' (default z, Z or theta)")
-    parser.add_argument("--direction", choices=("up", "down", "both"), help="how it is crossed (default up)")
+    parser.add_argument(
+        "--direction", choices=("up", "down", "both"), help="direction of the crossings (default up)"
+    )
     parser.add_argument("--extend", type=int, help="follow an unclear motion N times as long")
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")

@@ -47,7 +47,7 @@ def add_disk(parser: argparse.ArgumentParser, drive: str) -> None:
         dest="W",
         type=_rim_speed,
         metavar="RAD/S[:M]",
-        help="instead: at which rate the drive wheel turns, and its radius (default 0.03)",
+        help="in place of --W: rate of turning of the drive wheel, and its radius (default 0.03)",
     )
     group.add_argument("--R", type=float, metavar="M", help="radius [m] (default 0.08)")
     group.add_argument("--g", type=float, help="gravity [m/s^2] (default 9.81)")

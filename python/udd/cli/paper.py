@@ -35,7 +35,7 @@ def add(commands: Any) -> None:
         help="leave out what needs films, which are made and tracked once (minutes) and then kept in "
         "DIR/films",
     )
-    parser.add_argument("--list", action="store_true", help="only say which figures and claims there are")
+    parser.add_argument("--list", action="store_true", help="only list the figures and claims")
 
 
 def run(args: argparse.Namespace) -> CommandResult:

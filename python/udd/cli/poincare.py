@@ -42,11 +42,11 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--direction",
         choices=("up", "down", "both"),
-        help="how it is crossed (default up, turning points and reversals both)",
+        help="direction of the crossings (default up; of turning points and reversals both)",
     )
-    parser.add_argument("--points", type=int, default=1000, help="how many points (default 1000)")
+    parser.add_argument("--points", type=int, default=1000, help="number of points (default 1000)")
     parser.add_argument("--transient", type=int, default=100, help="points left out before (default 100)")
-    parser.add_argument("--t-max", type=float, help="time at which the orbit ends in any case")
+    parser.add_argument("--t-max", type=float, help="time at which the orbit ends at the latest")
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance (default 1e-9)")
     parser.add_argument("--atol", type=float, default=1e-12, help="absolute tolerance (default 1e-12)")
     parser.add_argument("--state", metavar="X,X,X", help="initial state omega,y,z or Omega,Y,Z,beta or ...")
