@@ -143,12 +143,16 @@ def test_a_spline_is_a_rival_of_splines_alone():
 
 def test_priors_count_terms_symbols_and_splines():
     single = -math.log(30)
-    over_speed = SimpleNamespace(
-        slot=SimpleNamespace(name="friction"), coordinates=[SimpleNamespace(name="|Omega|")]
+    over_speed, over_time = (
+        SimpleNamespace(
+            slot=SimpleNamespace(name="friction"), coordinates=[SimpleNamespace(name=name)], log_prior=prior
+        )
+        for name, prior in (("|Omega|", 0.0), ("t", -20.0))
     )
     assert log_prior(trial(QUADRATIC), 30) == single  # type: ignore[arg-type]
     assert log_prior(trial(QUADRATIC, COULOMB), 30) == 2 * single  # type: ignore[arg-type]
     assert log_prior(trial(QUADRATIC, curve=over_speed), 30) == single - 10.0  # type: ignore[arg-type]
+    assert log_prior(trial(QUADRATIC, curve=over_time), 30) == single - 30.0  # type: ignore[arg-type]
     free = trial(power(1.2), formula="1.0*x^1.2", curve=over_speed)
     assert log_prior(free, 30) == single - 3 * math.log(12)  # type: ignore[arg-type]
     wave = trial(power(1.2), formula="1.0*sin(2.0*x)", curve=over_speed)

@@ -103,11 +103,14 @@ def log_prior(trial: TrialFit, terms: int) -> float:
     """Compute a proposal's log prior probability, for a library with so many terms.
 
     A term of the library is one of these. A formula costs its description length in nats, and its coordinate.
-    A spline says less than a law and must be far better to lead. A term that machines hardly have, and
-    friction that changes with time alone, must be five nats better.
+    A spline says less than a law and must be far better to lead. A coordinate such as the time, which can
+    imitate others, costs more. A term that machines hardly have, and friction that changes with time alone,
+    must be five nats better.
     """
     single = -math.log(terms)
     unusual = EVIDENCE_MARGIN / 2 * sum(not c.usual or brakes_with_time(c.effect) for c in trial.candidates)
+    if trial.curve is not None:
+        unusual -= trial.curve.log_prior
     if trial.formula is not None:
         return single - unusual - _SYMBOL * length(trial.formula.node)
     return len(trial.candidates) * single - unusual - EVIDENCE_MARGIN * trial.is_curve

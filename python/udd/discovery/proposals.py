@@ -15,7 +15,7 @@ from udd.discovery.scoring.score_scan import Scored
 from udd.effects.user_defined import along_of
 from udd.fitting import Fit, Goal
 
-from .score_rounds import ScoreRound, states_first
+from .score_rounds import ScoreRound, most_probable_first
 from .thresholds import ALPHA
 from .time_budget import Clock
 from .trial_fits import (
@@ -89,7 +89,7 @@ class Proposals:
         A score around a wrong model does not distinguish coordinates that turn together. The friction as a
         function of the speed is always included, because drags are its rivals.
         """
-        single = [c for c in states_first(self.scores.curves) if len(c.coordinates) == 1]
+        single = [c for c in most_probable_first(self.scores.curves) if len(c.coordinates) == 1]
         if not single:
             return []
         # If a library term scores far higher than every curve, no curve is its rival.

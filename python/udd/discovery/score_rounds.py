@@ -126,17 +126,6 @@ def with_surfaces(scores: ScoreRound) -> ScoreRound:
     return replace(scores, curves=curves, comparisons=scores.comparisons + surfaces.comparisons)
 
 
-def states_first(curves: list[Curve]) -> list[Curve]:
-    """Sort curves by evidence, with a penalty on coordinates that replace states.
-
-    Curves over time absorb anything slow, and curves over the direction can imitate those over Y and Z. A
-    velocity without its momentum comes before the same with it.
-    """
-
-    # Without this an uneven grip is written as a function of atan2(Y, Z), not of Y.
-    def prior_penalty(curve: Curve) -> float:
-        coord = curve.coordinates[0]
-        roundabout = 2 if coord.name == "t" else 1 if coord.angle and coord.text != coord.name else 0
-        return EVIDENCE_MARGIN * (roundabout + 0.5 * (curve.slot.momentum == "consistent"))
-
-    return sorted(curves, key=lambda c: -c.evidence + prior_penalty(c))
+def most_probable_first(curves: list[Curve]) -> list[Curve]:
+    """Sort curves by their evidence and prior."""
+    return sorted(curves, key=lambda c: -(c.evidence + c.log_prior))

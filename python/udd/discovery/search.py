@@ -27,7 +27,7 @@ from udd.fitting import (
 from .acceptance import Acceptance, SearchState, Step
 from .proposals import Proposals
 from .results import RejectedEffect
-from .score_rounds import ScoreRound, score_round, states_first, with_surfaces
+from .score_rounds import ScoreRound, most_probable_first, score_round, with_surfaces
 from .thresholds import ALPHA, RejectionReason
 from .time_budget import TimeUpError
 from .trial_fits import fitted_ones, needed_in, of_library
@@ -237,7 +237,7 @@ class Search:
         def best(curves: Sequence[Curve]) -> list[Curve]:
             most = max((c.evidence for c in curves), default=0.0)
             one_each: dict[tuple[str, ...], list[Curve]] = {}
-            for curve in states_first([c for c in curves if c.evidence > _LIKELY * most]):
+            for curve in most_probable_first([c for c in curves if c.evidence > _LIKELY * most]):
                 one_each.setdefault(curve.key_without_momentum, []).append(curve)
             # A full fit decides between a velocity with its momentum and without.
             groups = list(one_each.values())[:_CURVES]

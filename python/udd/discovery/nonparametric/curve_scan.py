@@ -99,6 +99,18 @@ class Curve(OneLine):
         """Slot and coordinates, without the momentum, for comparison."""
         return _key(self.slot, self.coordinates)
 
+    @property
+    def log_prior(self) -> float:
+        """Log prior probability of the coordinates and the momentum, nats.
+
+        Curves over time absorb anything slow, and curves over the direction can imitate those over Y and Z. A
+        velocity without its momentum is simpler than the same with it.
+        """
+        # Without this an uneven grip is written as a function of atan2(Y, Z), not of Y.
+        first = self.coordinates[0]
+        indirect = 2 if first.name == "t" else 1 if first.angle and first.text != first.name else 0
+        return -EVIDENCE_MARGIN * (indirect + 0.5 * (self.slot.momentum == "consistent"))
+
     kin = renamed_attribute("kin", "key_without_momentum")
     beside = renamed_attribute("beside", "aligned_with")
 
