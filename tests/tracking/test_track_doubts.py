@@ -27,7 +27,7 @@ from udd.tracking.geometry.contact_point import pivot
 from udd.tracking.metric.apparent_gravity import apparent_gravity
 from udd.tracking.metric.film_clock import slow_parts
 from udd.tracking.metric.turns import count_turns
-from udd.video.reader import Film, time_of
+from udd.video.reader import Film, real_time, time_of
 
 SCALE, DRIVE = 875.0, 0.039
 Array = np.ndarray[Any, Any]
@@ -86,14 +86,59 @@ def test_steady_rotation_does_not_determine_the_contact(swing: float, determined
     assert (found is not None) == determined
 
 
-@pytest.mark.parametrize("clock", [(), ((2.0, 8.0), (8.0, 1.0)), ((0.0, 8.0), (8.0, 1.0)), ((3.0, 4.0),)])
+CLOCKS = [
+    (),
+    ((2.0, 8.0), (8.0, 1.0)),
+    ((0.0, 8.0), (8.0, 1.0)),
+    ((3.0, 4.0),),
+    ((2.0, 0.8), (6.0, 1.0)),
+    ((0.0, 0.8), (6.0, 1.0)),
+    ((2.3, 0.9), (6.1, 1.0)),
+]
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
 def test_slow_parts_are_seen_by_the_drive(clock: Any) -> None:
     stamps = np.arange(0, 10, 1 / 30)
     centre, angle, _ = seen(real_times(stamps, clock), 1)
-    parts = slow_parts(stamps, centre + 100 + 200j, angle)
+    parts = slow_parts(stamps, centre + 100 + 200j, angle, 0.08, SCALE)
     wanted = [*([(0.0, 1.0)] if clock and clock[0][0] else []), *clock]
-    assert [p.factor for p in parts] == [factor for _, factor in wanted]
+    assert [p.factor for p in parts] == pytest.approx([factor for _, factor in wanted], rel=0.005)
     assert all(abs(p.first / 30 - begin) < 0.07 for p, (begin, _) in zip(parts, wanted, strict=True))
+
+
+def test_missing_frames_are_seen_by_the_drive() -> None:
+    """Frames are missing singly, in pairs, and every second or third; the stamps are even."""
+    t = np.arange(0, 10, 1 / 30)
+    for missing in ([40, 77, 78, 120, 160], np.floor(np.arange(1, 300, 2.5)).astype(int)[:110]):
+        taken = np.delete(t, missing)
+        centre, angle, _ = seen(taken, 1)
+        stamps = np.arange(len(taken)) / 30
+        parts = slow_parts(stamps, centre + 100 + 200j, angle, 0.08, SCALE)
+        slower = tuple((float(stamps[part.first]), part.factor) for part in parts)
+        again = np.array([real_time(float(stamp), slower) for stamp in stamps])
+        assert len(parts) > 2 and np.abs(again - taken).max() < 0.04  # 0.17 s and 3.7 s by the stamps
+
+
+@pytest.mark.parametrize("kind", ["even", "step", "swaying"])
+def test_a_drive_that_varies_is_no_clock(kind: str) -> None:
+    t, fine = np.arange(0, 10, 1 / 30), np.arange(0, 10, 1e-4)
+    spin = 1.7 * np.sin(1.1 * fine) + 0.9 * np.sin(2.3 * fine + 1)
+    drive = (
+        DRIVE
+        * {
+            "even": np.ones(len(fine)),
+            "step": np.where(fine < 4, 1, 1.25),
+            "swaying": 1 + 0.1 * np.sin(9 * fine),
+        }[kind]
+    )
+    angle = np.concatenate([[0.0], np.cumsum(spin)[:-1] * 1e-4])
+    turned = np.exp(-1j * angle)
+    swept = np.concatenate([[0.0], np.cumsum(drive * turned)[:-1] * 1e-4])
+    centre = SCALE * (0.02 - 1j * swept) / turned
+    off, wrong = noise(len(t), 0)
+    place = np.interp(t, fine, centre.real) + 1j * np.interp(t, fine, centre.imag) + off
+    assert slow_parts(t, place + 100 + 200j, np.interp(t, fine, angle) + wrong, 0.08, SCALE) == []
 
 
 def test_a_film_that_is_slow_in_the_middle(tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ class Case:
 
 
 GLUED = ((0.0010, -0.0004), (-0.0008, 0.0006), (0.0003, 0.0010), (-0.0006, -0.0009))
+MISSING = (60, 97, 98, 140, 171, 200, 230, 231, 232, 290)
 BESIDE = {"size": (900, 700), "scale": 1750.0, "pivot": (620.0, 330.0)}
 CASES = (
     Case("clean", (0.02, 0.3, 0.0), {"exposure": 0.002, "support": 0.0}),
@@ -73,6 +74,15 @@ CASES = (
     Case("hand before the disk", (0.04, 0.5, 0.08), {}, {"hands": ((6.0, 6.6), (9.0, 9.4))}),
     Case("dim", (0.06, 0.8, 0.02), {}, {"gains": ((0.0, 0.12),)}),
     Case("slow in the middle", (0.3, 30.0, 0.02), {"fps": 30.0}, {"clock": ((4.0, 8.0), (10.0, 1.0))}),
+    # clocks and converters; MPEG-4 as OpenCV writes it has even stamps
+    Case("24 frames mixed into 30", (0.05, 0.7, 0.03), {"fps": 30.0}, {"blended": 24.0}),
+    Case("24 frames repeated into 30", (0.05, 0.7, 0.03), {"fps": 30.0}, {"copied": 24.0}),
+    Case("60 frames thinned to 24", (0.05, 0.7, 0.03), {"fps": 24.0}, {"copied": 60.0}),
+    Case("rate changes, even stamps", (0.05, 0.7, 0.02), {"fps": 30.0}, {"clock": ((4.0, 0.8), (9.0, 1.0))}),
+    Case("frames missing, even stamps", (0.05, 0.7, 0.02), {}, {"dropped": MISSING, "flat": True}),
+    Case("noise reduction", (0.05, 0.7, 0.01), {"noise": 4.0}, {"denoise": 0.8}),
+    Case("noise reduction, HEVC", (0.08, 1.0, 0.01), {"codec": "hevc", "noise": 4.0}, {"denoise": 0.8}),
+    Case("no drive, H.264", (0.08, 1.0, 0.01), {"codec": "h264", "quality": 28.0}, W=0.0),
 )
 
 

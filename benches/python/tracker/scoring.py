@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from films import Case
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from udd.film import Film
 
@@ -44,6 +45,21 @@ def matched(times: Array, film: Film, repeated: tuple[int, ...]) -> NDArray[np.i
     return np.asarray(near.argmin(axis=1))
 
 
+def as_taken(case: Case, film: Film) -> Film:
+    """Return the film with the camera's frames, if a converter mixed or repeated them."""
+    t = film.t
+    if "blended" in case.defects:
+        rate = case.defects["blended"]
+        t = np.arange(int(t[-1] * rate + 1e-6) + 1) / rate
+    elif "copied" in case.defects:
+        t = np.unique(t)
+    else:
+        return film
+    _, rows = np.unique(film.t, return_index=True)
+    state = CubicSpline(film.t[rows], film.state[rows])(t)
+    return replace(film, t=t, state=state, held=np.ones(len(t), dtype=bool))
+
+
 def size(e: Array, percentile: bool) -> float:
     """Rms, or the 95th percentile as a normal law would have it at 1.96 rms."""
     return float(np.percentile(np.abs(e), 95) if percentile else np.sqrt((e**2).mean()))
@@ -69,6 +85,7 @@ def score(
     drive: float = math.nan,
 ) -> Score:
     """Compare the rows (t; Y, Z, beta; NaN: not given) with the film's truth."""
+    film = as_taken(case, film)
     row = matched(t, film, ())
     truth = film.state[row, 1:]
     bad = np.isin(

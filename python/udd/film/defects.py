@@ -76,7 +76,17 @@ class Defects:
         Times in s from which and until which a hand hides the disk.
     clock : sequence of (float, float)
         Times in s, by the film's own clock, from which on the motion is shown slower than the stamps say, and
-        by which factor.
+        by which factor. It is below 1 where the motion is shown faster.
+    flat : bool
+        The time stamps of the file are even although frames were dropped.
+    blended : float
+        Frames per second of the camera, if a converter brought them to the film's rate and mixed neighbours
+        in time. 0 means that no converter did.
+    copied : float
+        The same for a converter that repeats or drops frames.
+    denoise : float
+        Share of the previous picture in the present one where the two differ little: the camera's temporal
+        noise reduction.
 
     See Also
     --------
@@ -114,13 +124,18 @@ class Defects:
     gains: Sequence[Sequence[float]] = ()
     hands: Sequence[Sequence[float]] = ()
     clock: Sequence[Sequence[float]] = ()
+    flat: bool = False
+    blended: float = 0.0
+    copied: float = 0.0
+    denoise: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""
         ranges = {
             "clutter": (0, 1000), "bars": (0, 20), "distance": (0.3, 100), "lens": (-0.3, 0.3),
             "readout": (0, 1), "gradient": (-1, 1), "flicker": (0, 0.9), "wobble": (0, 0.5), "after": (0, 60),
-            "poster": (0, 2), "turned": (-3, 3), "shake": (0, 50),
+            "poster": (0, 2), "turned": (-3, 3), "shake": (0, 50), "blended": (0, 1000), "copied": (0, 1000),
+            "denoise": (0, 0.95),
         }  # fmt: skip
         for name, (low, high) in ranges.items():
             value = number(name, getattr(self, name))

@@ -28,6 +28,7 @@ from .defects import Defects, hung, real_times, with_poster
 from .exposure import Scene
 from .light import Noise, Picture, to_light
 from .motion import Array, Motion, TrajectoryLike, checked, motion_of, spacing_error, then_falling
+from .processing import Denoiser, converter
 from .scene import room
 from .sprite import Patch
 
@@ -45,7 +46,7 @@ class Film(Drawable):
         The film file.
     t : ndarray, shape (n,)
         Time of the middle of each frame's exposure, s. For frame k it is k / fps. The file has the same time
-        stamps, unless the defect `clock` slows a part of the film down.
+        stamps, unless a defect (`clock`, `flat`, `copied`) changes the clock.
     state : ndarray, shape (n, 4)
         [Omega, Y, Z, beta] of the disk in the middle of each exposure, rad/s, m, m, rad.
     held : ndarray of bool, shape (n,)
@@ -86,8 +87,9 @@ class Film(Drawable):
     @property
     def truth(self) -> Measurement:
         """The measurement of a perfect tracker: Y, Z, beta in the middle of each exposure."""
+        new = np.diff(self.t, prepend=-np.inf) > 0  # without copies
         values = np.where(self.held[:, None], self.state[:, 1:], np.nan)
-        return Measurement(self.t, values, meta={"R": self.radius, "source": self.path.name})
+        return Measurement(self.t[new], values[new], meta={"R": self.radius, "source": self.path.name})
 
 
 @renamed(seed="rng")
@@ -195,7 +197,7 @@ def render(
     random = generator(rng)
     if codec not in CODECS:
         raise UddError(f"codec must be one of {', '.join(CODECS)}, got {codec!r}")
-    if codec == "mp4v" and defects.dropped:
+    if codec == "mp4v" and defects.dropped and not defects.flat:
         raise UddError("codec mp4v has frames at even times; use another one for a film with dropped frames")
     motion = motion_of(trajectory)
     if defects.after:
@@ -208,6 +210,11 @@ def render(
             "simulate more times (200 per second are plenty) or with dense=True"
         )
     stamps = frame_times(t, view, defects.after)
+    camera_rate = defects.blended or defects.copied
+    last = float(t[-1] - t[0]) + defects.after - view.exposure / 2
+    if camera_rate:  # a mixture needs the frame after it
+        last = math.floor(last * camera_rate + 1e-6) / camera_rate
+    stamps = stamps[real_times(stamps, defects.clock) <= last + 1e-6]
     numbers = np.setdiff1d(np.arange(len(stamps)), np.asarray(defects.dropped, dtype=int))
     wall = _background(background, view, radius)
     if defects.clutter:
@@ -217,6 +224,9 @@ def render(
     scene = Scene(view, radius, wall, support, defects, _patches(layout, radius))
     upright = defects.turned % 2 == 0
     real = real_times(stamps, defects.clock)
+    if defects.copied:  # of each picture that is shown
+        stamps_shown = np.floor(stamps * defects.copied + 0.5 - 1e-9) / defects.copied
+        real = real_times(stamps_shown, defects.clock)
     shown = t[0] + real
     write_film(
         target,
@@ -225,7 +235,7 @@ def render(
         view.rate,
         quality,
         codec,
-        numbers.tolist(),
+        None if defects.flat else numbers.tolist(),
     )
     times = real[numbers]
     on_wheels = shown[numbers] <= t[-1]
@@ -252,11 +262,24 @@ def _frames(
     noise: Noise,
     progress: Progress,
 ) -> Iterator[NDArray[np.uint8]]:
+    denoise = Denoiser(defects.denoise)
+
+    def take(time: float, stamp: float) -> NDArray[np.uint8]:
+        return denoise(noise.on(scene.expose(motion, time, stamp)))
+
+    start = float(stamps[0])
+
+    def take_at_camera_rate(number: int) -> NDArray[np.uint8]:
+        stamp = number / (defects.blended or defects.copied)
+        return take(start + float(real_times(np.array([stamp]), defects.clock)[0]), start + stamp)
+
+    convert = converter(take_at_camera_rate, defects)
     last: NDArray[np.uint8] | None = None
     with progress_bar(len(numbers), "frame", progress, title="film") as bar:
         for number in numbers.tolist():
             if number not in defects.repeated or last is None:
-                last = noise.on(scene.expose(motion, float(times[number]), float(stamps[number])))
+                time, stamp = float(times[number]), float(stamps[number])
+                last = take(time, stamp) if convert is None else convert.at(stamp - start)
                 if defects.mirrored:
                     last = np.ascontiguousarray(last[:, ::-1])
                 if defects.turned:

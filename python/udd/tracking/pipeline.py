@@ -34,7 +34,7 @@ from udd.tracking.metric.apparent_gravity import ApparentGravity, apparent_gravi
 from udd.tracking.metric.calibration_report import camera_of, meta_of
 from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.doubts import doubts, quarter_turns
-from udd.tracking.metric.film_clock import slow_parts
+from udd.tracking.metric.film_clock import slow_parts, text_of
 from udd.tracking.metric.pixels_to_metres import Camera, left_the_wheels, metres, recount
 from udd.tracking.metric.pose_covariance import add_shared_errors, covariance
 from udd.tracking.metric.turns import count_turns
@@ -48,6 +48,7 @@ from udd.tracking.passes.tag_tracking import follow_tags
 from udd.tracking.passes.tracks import Tracks
 from udd.tracking.passes.wobble import Wobble, wobble
 from udd.tracking.passes.wobble_correction import WobbleCorrection, correct_wobble
+from udd.video.frame_conversion import Conversion
 from udd.video.reader import Film, Picture, TrackError
 from udd.video.rgb_frames import rgb
 
@@ -327,12 +328,14 @@ def _track_marks(film: Film, options: TrackOptions, progress: Progress, watch: W
 def _retimed(film: Film, result: Tracking) -> bool:
     """Return True if the drive shows that parts are slowed down; the clock then follows the drive."""
     tracks = result.tracks
-    parts = [] if film.forced or film.slower else slow_parts(tracks.t, tracks.centre, tracks.angle)
+    if film.forced or film.slower:
+        return False
+    radius, scale = float(result.measurement.meta["R"]), result.camera.scale
+    parts = slow_parts(tracks.t, tracks.centre, tracks.angle, radius, scale)
     if not parts:
         return False
     film.slower = tuple((float(tracks.t[part.first]), part.factor) for part in parts)
-    said = ", ".join(f"{p.factor:.3g} ± {p.sigma:.2g} from frame {p.first} on" for p in parts)
-    film.clock_note = f"times by the drive, which the film slows down by a factor of {said}"
+    film.clock_note = f"times by the drive, which the film slows down by a factor of {text_of(parts)}"
     warnings.warn(f"{film.path}: {film.clock_note}", stacklevel=outside())
     return True
 
@@ -589,6 +592,8 @@ def _as_tracked(video: str | os.PathLike[str], tracked: Measurement | None) -> F
     rate = (1.0 if tracked is None else float(tracked.meta["fps"])) if Path(video).is_dir() else None
     film = Film(video, fps=rate)
     if tracked is not None:
+        if "conversion" in tracked.meta:
+            film.conversion = Conversion(*tracked.meta["conversion"])
         film.correct = correction_of(tracked.meta, tracked.quality, film.full_range)
     return film
 

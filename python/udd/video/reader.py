@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from udd.errors import TrackError as TrackError
 
 from .decoder_process import HEAD, LOOK, NO_FILM, images_in
 from .srgb import light_of
+
+if TYPE_CHECKING:
+    from .frame_conversion import Conversion
 
 Plane = NDArray[np.uint8]
 Rates = float | Sequence[Sequence[float]]  # frames per second, or pairs of a frame and the rate from it on
@@ -164,16 +167,30 @@ class Film:
         self.correct: Callable[[Picture], Picture] | None = None  # what is done to each picture
         self.tick: Callable[[], object] = lambda: None  # called for each picture that is read
         self.left_out: tuple[tuple[int, int], ...] = ()  # first and last frames of the parts without use
+        self.conversion: Conversion | None = None  # what a converter did, to be undone
+
+    @property
+    def clock_meta(self) -> dict[str, Any]:
+        """Entries of a measurement's header on the clock."""
+        said: dict[str, Any] = {"clock": self.clock_text} if self.clock_text else {}
+        c = self.conversion
+        return said if c is None else said | {"conversion": [c.sources, c.frames, c.how, c.phase]}
 
     @property
     def clock_text(self) -> str:
         """Source of the times if they are not the container's own; otherwise empty."""
-        return "; ".join(text for text in (self.clock.text if self.clock else "", self.clock_note) if text)
+        texts = (
+            self.clock.text if self.clock else "",
+            self.clock_note,
+            self.conversion.text if self.conversion else "",
+        )
+        return "; ".join(text for text in texts if text)
 
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
         """Yield all frames that decode, in order of presentation, with increasing times.
 
-        Frames are numbered from the first one that is yielded.
+        Frames are numbered from the first one that is yielded. If a converter changed the frame rate, the
+        frames are those of the camera.
 
         Parameters
         ----------
@@ -185,9 +202,17 @@ class Film:
         Picture
             Brightness, colour differences and time of a frame.
         """
-        self.broken = 0
-        if self.forced is not None or self.slower:
+        if self.forced is not None or self.slower or self.conversion is not None:
             since = 0.0  # the header's times are no help in seeking
+        pictures = self._decoded(since)
+        for picture in pictures if self.conversion is None else self.conversion.undo(pictures):
+            if self.slower:
+                picture = replace(picture, t=real_time(picture.t, self.slower))
+            yield picture if self.correct is None else self.correct(picture)
+
+    def _decoded(self, since: float) -> Iterator[Picture]:
+        """Yield the frames as they are coded, at the times of the header or of the given rates."""
+        self.broken = 0
         decoder = self._decoder()
         try:
             said = decoder.ask(repr(since))
@@ -199,12 +224,10 @@ class Film:
                 elif self.clock is not None:
                     # The halves of interlaced frames are half a period apart.
                     picture = replace(picture, t=self.clock.at(picture.t, parts=2))
-                if self.slower:
-                    picture = replace(picture, t=real_time(picture.t, self.slower))
                 if any(first <= picture.index <= last for first, last in self.left_out):
                     picture = replace(picture, damaged=True, left_out=True)
                 self.tick()
-                yield picture if self.correct is None else self.correct(picture)
+                yield picture
             self.broken = decoder.broken
         finally:
             if decoder.whole:

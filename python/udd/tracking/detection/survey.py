@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import cmath
+import warnings
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from udd.errors import outside
+from udd.video.frame_conversion import Samples
 from udd.video.reader import Film, Picture, TrackError
 
 from .colour_blobs import Sight
@@ -39,6 +42,8 @@ class Survey:
 def survey(film: Film) -> Survey:
     """Decode `film` once, keeping at most `MEMORY` bytes of it.
 
+    If a converter changed the frame rate, the film yields the frames of the camera from here on.
+
     Raises
     ------
     TrackError
@@ -47,6 +52,7 @@ def survey(film: Film) -> Survey:
     bursts: list[list[Picture]] = []
     stride, most, frames = 1, BURSTS, 0
     height = width = 0
+    samples = Samples(film.packets)
     for picture in film.pictures():
         number, place = divmod(frames, BURST)
         frames += 1
@@ -56,6 +62,8 @@ def survey(film: Film) -> Survey:
             most = max(8, min(BURSTS, int(MEMORY / (BURST * size))))
         if picture.y.shape != (height, width):
             raise TrackError(f"{film.path}: the picture changes its size at frame {picture.index}")
+        if film.conversion is None:
+            samples.add(picture.y)
         if number % stride or picture.damaged:
             continue
         if place == 0 or not bursts:
@@ -72,6 +80,12 @@ def survey(film: Film) -> Survey:
         raise TrackError(f"{film.path} is too short: {frames} frames, at least {FEWEST} are needed")
     if not bursts:
         raise TrackError(f"{film.path}: no frame is left: each one is damaged or left out")
+    film.conversion = film.conversion or samples.conversion()
+    if film.conversion is not None and samples.rows:
+        warnings.warn(f"{film.path}: {film.conversion.text}", stacklevel=outside())
+        missing, converted = max(0, film.promised - frames), survey(film)
+        film.promised = converted.frames + missing
+        return converted
     step = -(-len(bursts) // most)
     return Survey([b for b in bursts[::step] if b], frames, film.broken, height, width)
 

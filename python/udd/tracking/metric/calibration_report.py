@@ -101,7 +101,7 @@ def meta_of(
         "source": film.path.name,
         "R": options.disk_radius,
         "fps": film.fps,
-        **({"clock": film.clock_text} if film.clock_text else {}),
+        **film.clock_meta,
         "frames": len(tracks),
         "frames_missing": missing,
         "frames_lost": sum(flag != "" for flag in tracks.flag),

@@ -1,23 +1,43 @@
-"""Parts of a film that are slowed down: the drive, which is even, seems slower there."""
+"""Clock of a film by the drive, which is even: where it seems slower or faster, the time stamps are wrong.
+
+A drive may vary, too. The disk's rate of turning distinguishes the two, as it cannot jump in real time, and
+so does gravity, which agrees with itself by the right clock only.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from .apparent_gravity import apparent_gravity
+
 Array = NDArray[np.float64]
-WINDOW = 20  # frames that share a drive while the contact is found
-SMOOTH = 7  # frames over which the drive's median is taken
-SLOWER = 1.5  # factor from which on a part is slowed down; motors and their wheels vary by less
+WINDOW = 20  # frames that share a drive while the contact is estimated
+SLOWER = 1.5  # factor from which on the drive alone shows a part; motors and their wheels vary by less
 ODD = 3.0  # times the usual misfit: a window beyond has no even clock
-SHORTEST = 8  # frames of such a part
-MOST = 8  # parts
-ABOUT = 6  # frames by which the end of a part may be off at first
-WHOLE = 0.04  # relative difference within which a factor is a whole number
+SHORTEST = 8  # steps of a part that may show real time
+PENALTY = 40.0  # decrease of chi2 that a change of the clock must bring
+CHUNK = 3000  # steps that are cut into parts at once
+SMOOTH = 7  # steps over which a fall is recognised
+STOPPED = 0.02  # of the drive: with less, the disk is not driven
+NOISE = 0.1  # of the drive: speeds with more scatter show no clock
+ABOUT = 3  # frames on each side of a change, through which the angle is smooth in real time
+DEGREE = 4  # of this smooth curve
+BETTER = 0.4  # of the misfit by the stamps that may remain by the drive's clock
+CLEARLY = 12.0  # times the usual misfit that a change must explain
+WHOLE = 0.04  # relative difference within which a factor is a whole number or the inverse of one
+PARTS = 6  # largest denominator of other factors, as 4/5 for 24 and 30 frames per second
+SURE = 2.5  # standard errors within which a factor is such a fraction
+LISTED = 6  # parts
+AGREES = 0.6  # of gravity's relative error that remains if all changes are the clock's
+UNKNOWN = 0.2  # relative error of a factor by gravity from which on it does not decide
+ALIKE = 0.05  # of two clocks' logarithms between which gravity does not decide
 
 
 @dataclass(frozen=True)
@@ -29,8 +49,12 @@ class SlowPart:
     sigma: float
 
 
-def slow_parts(t: Array, centre: NDArray[np.complex128], angle: Array) -> list[SlowPart]:
-    """Find parts in which the drive seems slower than in others; the fastest parts are treated as real time.
+def slow_parts(
+    t: Array, centre: NDArray[np.complex128], angle: Array, radius: float, scale: float
+) -> list[SlowPart]:
+    """Find parts of a film in which the clock differs from that of the others.
+
+    Gravity decides which part shows real time. If it does not, the fastest one does.
 
     Parameters
     ----------
@@ -40,6 +64,10 @@ def slow_parts(t: Array, centre: NDArray[np.complex128], angle: Array) -> list[S
         Pixels; NaN where the disk was not seen.
     angle : ndarray (n,)
         rad.
+    radius : float
+        Radius of the disk, m.
+    scale : float
+        Pixels per metre.
 
     Returns
     -------
@@ -51,27 +79,63 @@ def slow_parts(t: Array, centre: NDArray[np.complex128], angle: Array) -> list[S
         return []
     pivot = _pivot(t, centre, angle, good)
     speed = _speeds(t, centre - pivot, angle, good)
-    smooth = median_filter(speed, SMOOTH, mode="nearest")
-    fast = float(np.quantile(smooth, 0.9))
-    if not fast > 0:
+    driven = np.flatnonzero(median_filter(speed, SMOOTH, mode="nearest") > STOPPED * np.median(np.abs(speed)))
+    if len(driven) < 2 * WINDOW:
         return []
-    level = np.round(np.log(np.clip(fast / np.maximum(smooth, 1e-9), 1 / 3, 100)) / np.log(SLOWER))
-    edges = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(speed)]
-    edges = _joined(edges, smooth)
-    if not 3 <= len(edges) <= MOST + 1:
+    speed, good = speed[: driven[-1] + 1], good[: driven[-1] + 2]  # without the fall of an ejected disk
+    usual, noise = float(np.median(np.abs(speed))), _noise(speed)
+    if not usual > 0 or noise > NOISE * float(np.quantile(speed, 0.9)):
         return []
-    edges = _sharpened(edges, speed)
-    means = [_mean(speed[a:b]) for a, b in pairwise(edges)]
-    most = max(mean for mean, _ in means)
-    if min(mean for mean, _ in means) <= 0:
+    away = np.conj(centre[good] - pivot) / scale
+    values = np.column_stack([away.real, away.imag, angle[good]])
+
+    def too_long(time: Array) -> tuple[float, float]:
+        """Return the factor by which times (n,) are too long by gravity, and its error."""
+        gravity = apparent_gravity(time, values, radius)
+        if gravity is None or not np.isfinite(gravity.sigma):
+            return 1.0, np.inf
+        return gravity.slower, 0.5 * gravity.slower * gravity.sigma / abs(gravity.value)
+
+    def precision(edges: Sequence[int]) -> float:
+        factor, sigma = too_long(_clock(edges, speed, t[good]))
+        return sigma / factor
+
+    every = _cut(speed, max(noise, 1e-3 * usual))
+    if len(every) < 3:
         return []
+    edges = _confirmed(every, speed, t[good], angle[good])
+    if len(edges) < len(every) and precision(every) < AGREES * precision(edges):
+        edges = every
+    if len(edges) < 3:
+        return []
+    level, sigma = _shared(*_levels(edges, speed))
+    if level.min() <= 0:
+        return []
+    time = np.concatenate([[0.0], np.cumsum(np.diff(t[good]) * np.repeat(level, np.diff(edges)))])
+    real = _real(
+        edges, level, float(time[-1] / (t[good[-1]] - t[good[0]])), lambda real: too_long(time / real)
+    )
     parts: list[SlowPart] = []
-    for first, (mean, sigma) in zip(edges[:-1], means, strict=True):
-        factor, error = most / mean, most / mean * sigma / mean
-        if abs(factor / round(factor) - 1) < max(WHOLE, 2 * error / factor):
-            factor = float(round(factor))
-        parts.append(SlowPart(0 if not parts else int(good[first]), factor, error))
-    return parts if max(p.factor for p in parts) > SLOWER else []
+    for first, mean, error in zip(edges[:-1], level, sigma, strict=True):
+        factor, off = real / mean, real / mean * error / mean
+        factor = _rational(factor, off)
+        parts.append(SlowPart(0 if not parts else int(good[first]), factor, off))
+    return parts if len({part.factor for part in parts}) > 1 else []
+
+
+def text_of(parts: Sequence[SlowPart]) -> str:
+    """Return the factors of the parts and where they begin, the first ones if there are many."""
+    said = [f"{p.factor:.3g} ± {p.sigma:.2g} from frame {p.first} on" for p in parts]
+    more = len(parts) - LISTED
+    return ", ".join(said[:LISTED]) + (f", and {more} more parts" if more > 0 else "")
+
+
+def _rational(factor: float, sigma: float) -> float:
+    """Return the simple fraction that a factor is within its error; otherwise the factor itself."""
+    fraction = Fraction(factor).limit_denominator(PARTS)
+    simple = fraction.numerator == 1 or fraction.denominator == 1
+    tolerance = max(WHOLE * factor if simple else 0.0, SURE * sigma)
+    return float(fraction) if fraction and abs(factor - fraction) < tolerance else factor
 
 
 def _pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray[np.intp]) -> complex:
@@ -105,36 +169,107 @@ def _speeds(t: Array, away: NDArray[np.complex128], angle: Array, good: NDArray[
     return np.asarray((drive * np.conj(usual) / max(abs(usual), 1e-300)).real)
 
 
-def _joined(edges: list[int], smooth: Array) -> list[int]:
-    """Edges of parts that are long enough and differ from those before them."""
-    out = [0]
+def _noise(speed: Array) -> float:
+    """Estimate the scatter of speeds from differences; every second or third may have another clock."""
+    apart = [np.median(np.abs(speed[lag:] - speed[:-lag])) for lag in (1, 2, 3, 5)]
+    return 1.48 * float(min(apart)) / 2**0.5
+
+
+def _cut(speed: Array, noise: float) -> list[int]:
+    """Cut speeds into parts with a constant mean: least squares with a penalty for each part, exactly."""
+    edges = [0]
+    for begin in range(0, len(speed), CHUNK):
+        part = speed[begin : begin + CHUNK] / noise
+        n = len(part)
+        sums, squares = (np.concatenate([[0.0], np.cumsum(part**power)]) for power in (1, 2))
+        cost, last = np.zeros(n + 1), np.zeros(n + 1, dtype=int)
+        for end in range(1, n + 1):
+            size = end - np.arange(end)
+            misfit = squares[end] - squares[:end] - (sums[end] - sums[:end]) ** 2 / size
+            total = cost[:end] + misfit + PENALTY
+            last[end] = int(np.argmin(total))
+            cost[end] = total[last[end]]
+        ends, at = [], n
+        while at > 0:
+            ends.append(begin + at)
+            at = int(last[at])
+        edges += ends[::-1]
+    return edges
+
+
+def _levels(edges: Sequence[int], speed: Array) -> tuple[Array, Array]:
+    """Return the mean speed of each part without outliers, and its standard error."""
+    usual, out = _noise(speed), []
     for a, b in pairwise(edges):
-        if b - a < SHORTEST:
-            continue
-        before, here = np.median(smooth[out[-1] : a]) if a > out[-1] else np.nan, np.median(smooth[a:b])
-        if a > 0 and a > out[-1] and not 1 / SLOWER < here / max(before, 1e-9) < SLOWER:
-            out.append(a)
-    return [*out, len(smooth)]
+        middle = float(np.median(speed[a:b]))
+        fair = speed[a:b][np.abs(speed[a:b] - middle) <= 3 * usual + 1e-12]
+        out.append((float(fair.mean()) if len(fair) else middle, usual / max(len(fair), 1) ** 0.5))
+    level, sigma = np.array(out).T
+    return level, sigma
 
 
-def _sharpened(edges: list[int], speed: Array) -> list[int]:
-    """Move the edges to their best places."""
-    out = list(edges)
-    for k in range(1, len(edges) - 1):
-        low, high = out[k - 1] + 2, out[k + 1] - 2
-        tries = range(max(low, edges[k] - ABOUT), min(high, edges[k] + ABOUT) + 1)
-        part = speed[out[k - 1] : out[k + 1]]
-        a, b = np.median(speed[out[k - 1] : edges[k]]), np.median(speed[edges[k] : out[k + 1]])
-        costs = [
-            np.abs(part[: n - out[k - 1]] - a).sum() + np.abs(part[n - out[k - 1] :] - b).sum() for n in tries
-        ]
-        out[k] = tries[int(np.argmin(costs))]
-    return out
+def _shared(level: Array, sigma: Array) -> tuple[Array, Array]:
+    """Return levels of which those that agree have a common mean, and its error: a film has few clocks."""
+    order = np.argsort(level)
+    wide = np.diff(level[order]) > SURE * np.hypot(sigma[order][1:], sigma[order][:-1])
+    for group in np.split(order, np.flatnonzero(wide) + 1):
+        weight = sigma[group] ** -2.0
+        level[group], sigma[group] = (weight @ level[group]) / weight.sum(), weight.sum() ** -0.5
+    return level, sigma
 
 
-def _mean(speed: Array) -> tuple[float, float]:
-    """Mean without outliers, and its standard error."""
-    middle = float(np.median(speed))
-    spread = 1.48 * float(np.median(np.abs(speed - middle)))
-    fair = speed[np.abs(speed - middle) <= 3 * spread + 1e-12]
-    return float(fair.mean()), spread / np.sqrt(len(fair))
+def _clock(edges: Sequence[int], speed: Array, t: Array) -> Array:
+    """Return times (n,) by the drive, the level of the longest part being real time."""
+    level = np.maximum(_levels(edges, speed)[0], 1e-9)
+    level = level / level[np.argmax(np.diff(edges))]
+    return np.concatenate([[0.0], np.cumsum(np.diff(t) * np.repeat(level, np.diff(edges)))])
+
+
+def _confirmed(edges: list[int], speed: Array, t: Array, angle: Array) -> list[int]:
+    """Return the edges at which the clock changes, not the drive: the angle is smooth by the new clock only.
+
+    If the disk hardly turns at an edge, a large factor decides, or a like one elsewhere.
+    """
+    level, time = _levels(edges, speed)[0], _clock(edges, speed, t)
+    plain = np.sort([_roughness(k, t, angle) for k in range(ABOUT, len(t) - ABOUT, ABOUT)])
+    noise = float(plain[len(plain) // 4]) if len(plain) else 0.0  # most windows have no edge, or few
+    ratios, sure, unsure = [], [], []
+    for number, k in enumerate(edges[1:-1]):
+        ratio = abs(float(np.log(max(level[number + 1], 1e-12) / max(level[number], 1e-12))))
+        stamped, driven = _roughness(k, t, angle), _roughness(k, time, angle)
+        if driven < BETTER * stamped and stamped > CLEARLY * noise:
+            sure.append(k)
+            ratios.append(ratio)
+        elif stamped <= CLEARLY * noise or driven < stamped:
+            unsure.append((k, ratio))
+    sure += [k for k, r in unsure if r > np.log(SLOWER) or any(abs(r - other) < ALIKE for other in ratios)]
+    return [0, *sorted(sure), edges[-1]]
+
+
+def _roughness(k: int, t: Array, angle: Array) -> float:
+    """Return the mean square misfit of a smooth curve through the angles about a frame."""
+    rows = slice(max(0, k - ABOUT), k + ABOUT + 1)
+    x = t[rows] - t[k]
+    powers = np.vander(x / np.abs(x).max(), DEGREE + 1)
+    rest = angle[rows] - powers @ np.linalg.lstsq(powers, angle[rows], rcond=None)[0]
+    return float(rest @ rest) / max(len(x) - DEGREE - 1, 1)
+
+
+def _real(
+    edges: Sequence[int], level: Array, mean: float, too_long: Callable[[float], tuple[float, float]]
+) -> float:
+    """Return the level of real time, by gravity; without it, the fastest one.
+
+    If most of the film has no long part, its mean may be real time as well: converters keep that.
+    """
+    size = np.diff(edges)
+    long = level[size >= SHORTEST]
+    uneven = size[size >= SHORTEST].sum() < 0.5 * size.sum()
+    levels = np.append(level, mean) if uneven else long
+    usual = mean if uneven else float(long.max())
+    factor, sigma = too_long(usual)
+    if not sigma < UNKNOWN * factor:
+        return usual
+    off = np.abs(np.log(levels / (usual * factor)))
+    alike = levels[off < off.min() + ALIKE]
+    return usual if usual in alike else float(alike.max())

@@ -297,7 +297,7 @@ def _pendulum(
         "source": film.path.name,
         "fps": film.fps,
         **({} if camera is None else camera.meta),
-        **({"clock": film.clock_text} if film.clock_text else {}),
+        **film.clock_meta,
         "frames": len(t),
         "frames_missing": max(0, film.promised - len(t)),
         "frames_lost": int((~seen).sum()),
