@@ -221,7 +221,8 @@ def final(**values: tuple[float, float]) -> Any:
     """A fit of which only the numbers count."""
     order = {name.replace("__", "."): value for name, (value, _sd) in values.items()}
     covariance = np.diag([sd**2 for _value, sd in values.values()])
-    return SimpleNamespace(parameters=order, covariance=covariance, model=udd.Disk(0.04))
+    record = SimpleNamespace(film=np.zeros(500, int), t=np.linspace(0.0, 10.0, 500))
+    return SimpleNamespace(parameters=order, covariance=covariance, model=udd.Disk(0.04), record=record)
 
 
 def test_a_law_with_memory_is_compared_at_its_most_probable_model_error():
@@ -248,6 +249,15 @@ def test_the_amplitudes_of_a_wave_count_together():
     wave = udd.effects.eccentric_mass(a=0.01, b=0.0)
     numbers = final(eccentric_mass__a=(0.01, 0.001), eccentric_mass__b=(0.0, 0.001))
     assert undetermined(added(wave), numbers) == []
+
+
+@pytest.mark.parametrize(("frequency", "doubtful"), [(0.12, True), (0.5, False)])
+def test_a_wave_of_fewer_than_two_periods_is_not_identified(monkeypatch, frequency, doubtful):
+    monkeypatch.setattr("udd.discovery.verdict.readings", lambda _fit: [])
+    ripple = udd.effects.drive_ripple(f=frequency, a=0.01, b=0.0)
+    numbers = final(drive_ripple__a=(0.01, 0.001), drive_ripple__b=(0.0, 0.001))
+    doubts = doubts_of([added(ripple)], numbers, (0.5, 0.4, 0.6), 1000)
+    assert any("two of its periods" in doubt for doubt in doubts) is doubtful
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from .results import AddedEffect
 
 _SIZE = 0.98  # ratio of held-out errors below which a gain has a size
 _DETERMINED = 3.0  # standard errors
+_PERIODS = 2.0  # periods of a wave, below which a frequency scan does not start
 
 
 def verdict_of(
@@ -70,7 +71,10 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
             result.append(
                 f"{effect.title}: as a swing decays, the effects of time and of amplitude are confounded."
             )
-        if not effect.is_law:
+        # Without this, a wave of 1.2 periods stands for half of a harvest that saturates (ODEBench 18).
+        if _periods(effect, final) < _PERIODS:
+            result.append(f"{effect.title}: the record contains fewer than two of its periods.")
+        elif not effect.is_law:
             result.append(f"{effect.title} is a curve, written as a formula: no law of one term.")
         elif open_constants := undetermined(effect, final):
             result.append(f"{effect.title}: the data do not determine {', '.join(open_constants)}.")
@@ -80,6 +84,14 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
     if added and not has_size(ratio) and not any(_predicts(effect.ratio, held_out) for effect in added):
         result.append("Held-out data gain less than 2 %, and less than 10 nats.")
     return result
+
+
+def _periods(added: AddedEffect, final: Fit) -> float:
+    """Return the number of a wave's periods in the longest record; infinity for other effects."""
+    film, t = final.record.film, final.record.t
+    longest = max(float(np.ptp(t[film == number])) for number in np.unique(film))
+    frequencies = [added.parameters[p.name] for p in added.effect.spec.parameters if p.role == "frequency"]
+    return min((abs(f) * longest for f in frequencies), default=np.inf)
 
 
 def has_size(ratio: Ratio) -> bool:
