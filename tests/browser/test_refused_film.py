@@ -32,6 +32,7 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> tuple[Film, Path]:
 def click(page: Any, film: Film, tool: str, places: list[tuple[float, float]]) -> None:
     """Choose a tool and click on places of the frame, in pixels of the film."""
     page.check(f"input[value={tool}]")
+    page.locator(".clicks canvas").evaluate("canvas => canvas.scrollIntoView({ block: 'center' })")
     box = page.locator(".clicks canvas").bounding_box()
     for u, v in places:
         page.mouse.click(
@@ -57,7 +58,6 @@ def test_clicks_become_a_command(browser: Any, refused: tuple[Film, Path], size:
         page.goto(path.as_uri())
         until(page, "document.querySelector('.clicks-note')?.textContent === 'Nothing is clicked yet.'")
         assert page.locator(".clicks > button").is_disabled()
-        page.locator(".clicks canvas").scroll_into_view_if_needed()
         frame = int(page.locator(".clicks output").text_content().split()[1].rstrip(","))
         wanted = {"marks": marks(film, frame, (2, 3)), "edge": edge(film, frame)}
         click(page, film, "marks", wanted["marks"])
@@ -98,7 +98,6 @@ def test_the_page_tracks_the_film_again(opened: Opened, refused: tuple[Film, Pat
     page.wait_for_selector("#refused:not([hidden])")
     assert page.locator("#failed").text_content().startswith("No disk with marks in red")
     assert page.locator("#track-again").is_disabled()
-    page.locator(".clicks canvas").scroll_into_view_if_needed()
     frame = int(page.locator(".clicks output").text_content().split()[1].rstrip(","))
     click(page, film, "marks", marks(film, frame, (2, 3)))
     assert page.locator("#track-again").is_disabled()
@@ -107,5 +106,6 @@ def test_the_page_tracks_the_film_again(opened: Opened, refused: tuple[Film, Pat
     page.click("#track-again")
     # It was refused because red and orange are missing. Now it is tracked, and a model is fitted.
     until(page, "document.getElementById('stages').textContent.includes('fit')", 90)
+    assert "refining the positions" in page.locator("#stages").text_content()
     page.click("#cancel")
     until(page, "document.getElementById('failed').textContent === 'Cancelled.'")

@@ -85,3 +85,12 @@ def test_what_does_not_hang_is_no_pendulum(
     film = write(tmp_path / "film.mp4", room(draw) + room(draw)[::-1])
     with pytest.raises(UddError, match=words):
         udd.track(film, bob="red")
+
+
+def test_the_colour_of_what_moves_is_given(tmp_path: Path) -> None:
+    def draw(wall: Picture, k: int) -> None:
+        cv2.circle(wall, (60 + 6 * k, 170), 13, (20, 50, 30), -1)
+
+    film = write(tmp_path / "film.mp4", room(draw))
+    with pytest.raises(UddError, match=r"no bob of that colour moves .* codes (19|20|21),(49|50|51),3[01]:"):
+        udd.track(film, bob="green")

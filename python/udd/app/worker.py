@@ -166,8 +166,17 @@ def _tracked(file: Path, radius: float, hints: dict[str, Any], tell: Tell, drive
             frame["centre"] = [factor * c for c in seen.centre]
         tell({"frame": frame, "jpeg": base64.b64encode(jpeg.tobytes()).decode()})
 
+    refining = False
+
+    def stage(text: str) -> None:
+        nonlocal refining
+        if text.startswith("refine") and not refining:
+            refining = True
+            tell({"say": "refining the positions"})
+
     try:
-        return track_disk(file, disk_radius=radius, watch=watch, config=hints).measurement
+        done = track_disk(file, disk_radius=radius, watch=watch, config=hints, progress=stage)
+        return done.measurement
     except UddError:
         _leave_frames(file, hints)
         raise

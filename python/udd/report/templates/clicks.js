@@ -126,7 +126,7 @@ export class Clicks {
     this.canvas.width = image.naturalWidth;
     this.canvas.height = image.naturalHeight;
     const { width, height } = this.canvas;
-    this.canvas.style.width = `min(100%, ${Math.max(480, width)}px, ${(85 * width) / height}vh)`;
+    this.canvas.style.width = `min(100%, ${Math.max(480, width)}px, ${(70 * width) / height}vh)`;
     this.tell();
   }
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.video.reader import Film, Picture, TrackError
+from udd.video.rgb_frames import rgb
 from udd.video.srgb import light_of
 
 from .colour_blobs import Blobs, blobs
@@ -112,10 +113,25 @@ def bob_colour(film: Film, some: Sequence[Picture], behind: Background, colour: 
             seen.append(np.median(codes[best], axis=0))
     if len(seen) < FEWEST:
         raise TrackError(
-            f"{film.path}: nothing of about the bob's colour moves in this film; "
-            "say its colour as sRGB codes, as a picture of the film shows it"
+            f"{film.path}: nothing of about the bob's colour moves in this film; {_moving(some, behind)}"
         )
     return BobColour(colour.chroma, np.median(np.array(seen), axis=0))
+
+
+def _moving(some: Sequence[Picture], behind: Background) -> str:
+    """Return the colour of what moves, as the end of a message."""
+    seen = []
+    for picture in some:
+        moved = (np.abs(behind.change(picture)).max(axis=2) > CONTRAST) & behind.inside
+        best = _thickest(moved, SMALL // 4)
+        if best is not None:
+            rows, columns = best.shape
+            codes = rgb(picture, behind.full_range)[::2, ::2][:rows, :columns]
+            seen.append(np.median(codes[best], axis=0))
+    if len(seen) < FEWEST:
+        return "nothing else moves in it either"
+    said = ",".join(f"{code:.0f}" for code in np.median(np.array(seen), axis=0))
+    return f"what moves has about the sRGB codes {said}: give these as bob if it is the bob"
 
 
 def usual_area(film: Film, some: Sequence[Picture], behind: Background, colour: BobColour) -> float:
@@ -129,7 +145,7 @@ def usual_area(film: Film, some: Sequence[Picture], behind: Background, colour: 
     blobs_seen = [locate_bob(p, behind, colour) for p in some]
     areas = [blob.area for blob in blobs_seen if blob is not None]
     if len(areas) < FEWEST:
-        raise TrackError(f"{film.path}: no bob of that colour moves in this film")
+        raise TrackError(f"{film.path}: no bob of that colour moves in this film; {_moving(some, behind)}")
     return float(np.median(areas))
 
 
