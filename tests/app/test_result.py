@@ -20,4 +20,6 @@ def test_a_verdict_has_constants_its_origin_and_a_single_spelling(monkeypatch: p
         assert re.fullmatch(r"\d+\.\d+\(\d+(\.\d+)?\)", row["value"]) and row["meaning"] and row["unit"]
     assert shown["limits"][0] == origin
     text = " ".join([shown["effects"][0]["equation"], *shown["limits"]])
+    first, *others = [row["chi2"] for row in shown["evidence"]]
+    assert first == found.effects[0].chi2 and others == sorted(others, reverse=True)  # as in the report
     assert text.count("W_c") == 2 and "Wc" not in text and " - " not in text

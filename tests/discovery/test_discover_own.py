@@ -23,6 +23,7 @@ from udd.discovery.trial_fits import fitted_ones, of_library
 from udd.errors import FitError, ModelError
 from udd.fitting import fit_record, record_of
 from udd.fitting.time_scale import motion_time_scale
+from udd.report import formula_report
 
 DRIVEN = {"theta": "v", "v": "-w2*sin(theta) - g*v + F*cos(1.4*t)"}
 DRIVEN_VALUES = {"w2": 4.0, "g": 0.05, "F": 2.0}
@@ -241,6 +242,12 @@ def test_a_users_candidate_is_tried_and_a_wrong_one_named(tmp_path: Path) -> Non
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "The rate v&#39; has one more term." in page and "c*(tanh(5*v))" in page
     assert page.count("<img") == 6 and "data:image/svg+xml" in page  # no picture comes from elsewhere
+    # The known model's error is that of `udd.fit`: it contains what the model lacks.
+    stiffness, friction = formula_report.parameters(result)
+    value, _, brackets = str(stiffness["before"]).rstrip(")").partition("(")
+    error = float(brackets) / (1 if "." in brackets else 10 ** len(value.partition(".")[2]))
+    assert error == pytest.approx(udd.fit(record, baseline).errors["k"], rel=0.5)
+    assert error > 5 * result.baseline.errors["k"] and friction["name"] == "c of tanh(5*v) in v'"
     for wrong, said in [
         (("w", "v"), "no equation of 'w'"),
         (("v", "u"), "unknown name u"),

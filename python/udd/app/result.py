@@ -10,6 +10,7 @@ from udd.fitting.diagnostics import units
 from udd.fitting.parameter_meanings import meaning
 from udd.models import Disk
 from udd.models.serialization import model_to_dict
+from udd.plot.evidence import decreases
 from udd.report import tables, wording
 from udd.report.document import text_of
 
@@ -44,12 +45,21 @@ def of(discovery: Any) -> dict[str, Any]:
         "ratio": numbers.ratio if discovery.effects else None,
         "interval": numbers.interval if discovery.effects else None,
         "errors": [{key: text_of(text) for key, text in row.items()} for row in tables.errors(discovery)],
-        "evidence": [
-            {"title": _symbols(s.candidate.title), "chi2": s.chi2 if math.isfinite(s.chi2) else None}
-            for s in (discovery.scans[0][:8] if discovery.scans else [])
-        ],
+        "evidence": _evidence(discovery),
         "explore": _explore(discovery),
     }
+
+
+def _evidence(discovery: Any) -> list[dict[str, Any]]:
+    """Return the decrease of chi2 by the best candidates, the largest first: of a fit if there is one."""
+    scored = discovery.scans[0][:8] if discovery.scans else []
+    fitted = decreases(discovery, 0) if scored else {}
+    chi2 = [(s.candidate.title, fitted.get(s.candidate.title, s.chi2)) for s in scored]
+    best_first = sorted(chi2, key=lambda pair: -pair[1] if math.isfinite(pair[1]) else math.inf)
+    return [
+        {"title": _symbols(title), "chi2": value if math.isfinite(value) else None}
+        for title, value in best_first
+    ]
 
 
 def _symbols(text: str) -> str:

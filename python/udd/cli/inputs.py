@@ -15,7 +15,7 @@ from udd.errors import UddError
 from .option_names import OPTIONS
 from .options import add_disk, add_pendulum, disk, effects, given, names, pendulum, refuse_others
 from .output import shown_progress
-from .span import add_span, hint_at_rest
+from .span import add_span, part_of
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -164,16 +164,11 @@ class Inputs:
 def inputs_of(args: argparse.Namespace) -> Inputs:
     """Read the files; films are tracked."""
     measurements, models, films = [], [], []
-    for one in _each(args):
-        measurement, film = measurement_of(one)
-        if not (one.begin is one.end is None):
-            from udd.measurement.time_span import between
-
-            measurement = between(measurement, one.begin, one.end)
-        if measurement.names == ("Omega",):
-            hint_at_rest(one, measurement)
+    for options in _each(args):
+        measurement, film = measurement_of(options)
+        measurement = part_of(options, measurement)
         measurements.append(measurement)
-        models.append(model_of(one, measurement))
+        models.append(model_of(options, measurement))
         films.append(film)
     return Inputs(args.files, measurements, models, films)
 

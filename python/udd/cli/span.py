@@ -28,7 +28,17 @@ def add_span(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def hint_at_rest(args: argparse.Namespace, measurement: Measurement) -> None:
+def part_of(args: argparse.Namespace, measurement: Measurement) -> Measurement:
+    """Return the part of a record that the options ask for; hint at a pendulum that is at rest first."""
+    from udd.measurement.time_span import between
+
+    part = between(measurement, args.begin, args.end)
+    if part.names == ("Omega",):
+        _hint_at_rest(args, part)
+    return part
+
+
+def _hint_at_rest(args: argparse.Namespace, measurement: Measurement) -> None:
     """Print the option that leaves out the beginning, if the pendulum does not turn there."""
     from udd.measurement.gyroscope import starts_to_turn
 

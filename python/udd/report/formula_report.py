@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from udd.fitting import eased
 from udd.models.formula_model import FormulaModel
 from udd.plot.style import AFTER as ADDED
 from udd.plot.style import BEFORE as KNOWN
@@ -153,14 +154,24 @@ def _numbers(discovery: Discovery) -> Section:
 
 def parameters(discovery: Discovery) -> list[dict[str, Text]]:
     """List every free parameter, before and after."""
+    baseline = discovery.baseline
+    if discovery.effects:
+        # These are the errors of `udd fit`. The search's own ones do not contain what the model lacks.
+        baseline = eased(baseline).with_diagnostics()
     rows: list[dict[str, Text]] = []
     for name in discovery.fit.parameters:
         before, after = (
             wording.with_error(fit.parameters[name], fit.errors[name]) if name in fit.parameters else "–"
-            for fit in (discovery.baseline, discovery.fit)
+            for fit in (baseline, discovery.fit)
         )
-        rows.append({"name": name, "before": before, "after": after})
+        rows.append({"name": _symbol(name, discovery), "before": before, "after": after})
     return rows
+
+
+def _symbol(name: str, discovery: Discovery) -> Text:
+    """Return a parameter's name; of an effect's parameter its letter and the effect's title."""
+    effect, dot, letter = name.partition(".")
+    return f"{letter} of {wording.title_of(discovery, effect)}" if dot else name
 
 
 def equations(discovery: Discovery) -> list[str]:
@@ -169,7 +180,7 @@ def equations(discovery: Discovery) -> list[str]:
     assert isinstance(model, FormulaModel)
     late = dict(model.delays)
     seen = [
-        f"{name} = {text}" + (f", late by {late[name]}" if name in late else "")
+        f"measured {name} = {text}" + (f", late by {late[name]}" if name in late else "")
         for name, text in model.observe
     ]
     return [f"{name}' = {text}" for name, text in model.equations.items()] + seen
