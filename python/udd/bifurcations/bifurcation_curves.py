@@ -25,7 +25,16 @@ from .connecting_orbits import Connection
 from .connection_curves import ConnectionWay
 from .curves_born_at import fold_of_cycles_at, homoclinic_at
 from .flow_map import Floats
-from .locus_points import ENDS, LocusPlace, LocusPoint, LocusTrace, Segment, points_between, watched_functions
+from .locus_points import (
+    ENDS,
+    LocusPlace,
+    LocusPoint,
+    LocusTrace,
+    Segment,
+    outside,
+    points_between,
+    watched_functions,
+)
 from .pseudo_arclength import CorrectorFailed
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
@@ -345,36 +354,27 @@ class _Way:
             trace.points += points
             trace.end = "a Bautin point" if points else "lost: the cycles shrink to an equilibrium"
             return
-        outside = self._outside(there)
-        last = self._at_bounds(segment, outside)
+        left = outside(self.surface.values(there), self.box)
+        last = self._at_bounds(segment, left)
         for part, point in points_between(self.kind, segment, before, after):
-            if outside and (last is None or part > last[0]):
+            if left and (last is None or part > last[0]):
                 continue
             trace.points.append(point)
             if point.kind in ENDS.get(self.kind, ()):
                 trace.places.append(LocusPlace(point.values, point.solution, 0.0))
                 trace.end = f"a {point.kind} point"
                 return
-        if outside:
-            trace.end = f"the bound {outside[0][1] if last is None else last[1]:.6g}"
+        if left:
+            trace.end = f"the bound {left[0][1] if last is None else last[1]:.6g}"
             if last is not None:
                 trace.places.append(_place(surface, self.kind, last[2]))
 
-    def _outside(self, point: SurfacePoint) -> list[tuple[int, float]]:
-        """Return the parameters that have left their bounds, and these bounds."""
-        pairs = zip(self.surface.values(point).tolist(), self.box.tolist(), strict=True)
-        return [
-            (k, low if value < low else high)
-            for k, (value, (low, high)) in enumerate(pairs)
-            if not low <= value <= high
-        ]
-
     def _at_bounds(
-        self, segment: Segment, outside: list[tuple[int, float]]
+        self, segment: Segment, left: list[tuple[int, float]]
     ) -> tuple[float, float, SurfacePoint] | None:
         """Return the part of a step after which the curve first meets a bound, the bound, and the point."""
         met = []
-        for k, bound in outside:
+        for k, bound in left:
 
             def beyond(point: SurfacePoint, k: int = k, bound: float = bound) -> float:
                 return float(self.surface.values(point)[k] - bound)

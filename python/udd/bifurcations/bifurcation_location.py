@@ -123,19 +123,8 @@ def pitchfork_at(
     """Find the pitchfork near the distance `sigma` from `a`, where the parameter turns along its side branch.
 
     The equations are singular there. The curve is smooth, so that polynomials through its points about the
-    pitchfork, none of them too near, give it to rounding.
-
-    Returns
-    -------
-    sigma : float
-    place : CurvePoint
-    error : float
-        A bound of the parameter's error: what one degree less changes.
-
-    Raises
-    ------
-    CorrectorFailed
-        The curve cannot be followed about the pitchfork.
+    pitchfork, none of them too near, give it to rounding. The bound of the parameter's error is what one
+    degree less changes. CorrectorFailed: the curve cannot be followed about the pitchfork.
     """
     width = 0.5 * step
     distances = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
@@ -158,10 +147,7 @@ def pitchfork_at(
 def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, Floats, Floats]:
     """Return the distance at which the parameter turns, the point and its slope, by polynomials.
 
-    Raises
-    ------
-    CorrectorFailed
-        It does not turn.
+    CorrectorFailed: it does not turn.
     """
     table = chebyshev.chebfit(distances, points, degree)
     slope = chebyshev.chebder(table)
@@ -176,10 +162,7 @@ def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, 
 def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
     """Locate the zero of one of the functions between `a` and the point at the distance `step` after it.
 
-    Raises
-    ------
-    CorrectorFailed, ValueError
-        The curve cannot be followed there, or the function does not change its sign.
+    CorrectorFailed, ValueError: the curve cannot be followed there, or the function does not change its sign.
     """
 
     def at(sigma: float) -> tuple[float, CurvePoint]:

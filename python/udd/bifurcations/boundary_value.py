@@ -39,10 +39,7 @@ class SparseEquations:
     def solve(self, row: Floats, right: Floats) -> Floats:
         """Return the unknowns for these right sides, of which the last is that of one more `row`.
 
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            The equations are singular.
+        LinAlgError: the equations are singular.
         """
         whole = sparse.vstack([self.matrix, row[np.newaxis]], format="csc")
         try:
@@ -116,10 +113,7 @@ class ConnectingCurve:
 
         `rests` (1 or 2, r) are the equilibria, `nodes` (m + 1, r) the orbit.
 
-        Raises
-        ------
-        ModelError
-            The eigenvalues of the equilibria admit no such orbit at isolated values of one parameter.
+        ModelError: the eigenvalues of the equilibria admit no such orbit at isolated values of one parameter.
         """
         value = float(values[parameter])
         nothing = np.zeros(flow.dim)
@@ -248,10 +242,7 @@ class ConnectingCurve:
     def solved(self, guess: Floats, row: Floats | None = None) -> tuple[ConnectingCurve, Floats]:
         """Return the curve and its point across `row` near a guess; by default the last parameter is fixed.
 
-        Raises
-        ------
-        CorrectorFailed
-            Newton's method does not converge, or to what is no such orbit.
+        CorrectorFailed: Newton's method does not converge, or to what is no such orbit.
         """
         curve = self.anchored(guess)
         across = natural_constraint(guess) if row is None else row

@@ -20,7 +20,7 @@ from udd.models import Model
 
 from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector
+from .pseudo_arclength import CorrectorFailed, CurvePoint, guess_at, natural_constraint, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
 from .solution_curve import HELD
 from .solutions import Equilibrium, PeriodicOrbit
@@ -254,10 +254,7 @@ class Branch(Drawable):
             if not min(a, b) <= value <= max(a, b) or (value == b and i + 2 < len(self)):
                 continue
             curve, place = self._places[i if abs(value - a) <= abs(value - b) else i + 1]
-            guess = place.u.copy()
-            if abs(place.tangent[-1]) > 1e-3:
-                guess = guess + place.tangent * ((value / curve.scale - guess[-1]) / place.tangent[-1])
-            guess[-1] = value / curve.scale
+            guess = guess_at(place, value / curve.scale, 1e-3)
             with suppress(CorrectorFailed, IntegrationError):
                 curve = curve.anchored(place.u)
                 u = newton_corrector(curve, guess, natural_constraint(guess), patience=20)
@@ -343,14 +340,14 @@ class Branch(Drawable):
 def cycles_of(branch: Branch) -> list[tuple[PeriodicOrbitCurve, Floats]]:
     """Return the curves and unknowns of the cycles of a branch over a parameter of an autonomous model.
 
-    Raises
-    ------
-    ModelError
-        It is something else.
+    ModelError: it is something else.
     """
     if not isinstance(branch, Branch) or branch.kind != "cycle":
         raise ModelError("a branch of cycles is needed, of udd.continuation")
-    curve = branch._places[0][0]
-    if not isinstance(curve, PeriodicOrbitCurve) or curve.parameter == HELD or curve.flow.forcing is not None:
-        raise ModelError("the branch must be followed over a parameter of a model that is not forced")
-    return [(curve, place.u) for curve, place in branch._places if isinstance(curve, PeriodicOrbitCurve)]
+    cycles = [(curve, place.u) for curve, place in branch._places if curve.kind == "cycle"]
+    curve = cycles[0][0]
+    if curve.parameter == HELD or curve.flow.forcing is not None:
+        raise ModelError(
+            f"the branch is over {branch.parameter}; needed is a parameter of a model that is not forced"
+        )
+    return cycles

@@ -19,7 +19,7 @@ from .branch_following import CLOSED, BranchTrace, ContinuationLimits, Station, 
 from .branch_switching import born_at
 from .conservative_families import PERIOD, Conserved, FamilyCurve
 from .equilibrium_curve import EquilibriumCurve
-from .flow_map import FlowMap, flow_of
+from .flow_map import Floats, flow_of
 from .forced_orbits import require_period
 from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
@@ -158,12 +158,11 @@ def continuation(
     limits = ContinuationLimits(low, high, ds, ds_max, whole("max_points", max_points, 1), limit, wanted)
     if isinstance(start, BifurcationPoint):
         return branch_from([follow_branch(curve, place, limits)], model, parameter, f"born at a {start.kind}")
-    up = place if place.tangent[-1] >= 0 else CurvePoint(place.u, -place.tangent)
-    ways = []
-    if direction in ("both", "down"):
-        ways.append(follow_branch(curve, CurvePoint(up.u, -up.tangent), limits))
-    if direction == "up" or (direction == "both" and ways[0].end != CLOSED):
-        ways.append(follow_branch(curve, up, limits))
+    up = place if place.tangent[-1] >= 0 else place.reversed()
+    ways: list[BranchTrace] = []
+    for begin in {"both": (up.reversed(), up), "down": (up.reversed(),), "up": (up,)}[direction]:
+        if not ways or ways[0].end != CLOSED:
+            ways.append(follow_branch(curve, begin, limits))
     return branch_from(ways, model, parameter, "the start")
 
 
@@ -204,37 +203,11 @@ def _at(
     start: Equilibrium | PeriodicOrbit, parameter: str, low: float, high: float
 ) -> tuple[AnyCurve, CurvePoint]:
     """Return the curve through a solution, and the place there."""
-    solved = start._solved if isinstance(start, PeriodicOrbit) else None
-    forcing = None if solved is None else solved[0].flow.forcing
-    flow: FlowMap = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
-    family = isinstance(start, PeriodicOrbit) and parameter not in flow.names
-    if family and forcing is not None:
-        raise ModelError(f"a forced cycle is followed over a parameter, not over {parameter}")
-    index = HELD if family else flow.index(parameter)
-    if forcing is not None:
-        require_period(flow.model, forcing, flow.kept, flow.size, parameter)
-    value = 0.0 if family else float(flow.values[index])
     curve: AnyCurve
     if isinstance(start, Equilibrium):
-        curve = EquilibriumCurve(flow, flow.values, index, unit_of(value, low, high))
-        u = curve.pack(flow.reduced(start.state), value)
+        curve, u = _through_rest(start, parameter, low, high)
     else:
-        if solved is None:
-            raise ModelError("this cycle was not made by udd.periodic_orbit")
-        old = solved[0]
-        nodes, span = old.nodes(solved[1]), old.span(solved[1])
-        free_flow = replace(old.flow, model=flow.model)
-        kept = Conserved.of(free_flow, parameter) if family and parameter != PERIOD else None
-        if kept is not None:
-            value = kept.at(free_flow, nodes[0])[0]
-        scale = unit_of(value, low, high)
-        where = old.mirror, old.shift, old.reference, old.across, old.share
-        common = free_flow, flow.values, index, scale, span, old.pieces, *where
-        curve = FamilyCurve(*common, conserved=kept) if family else PeriodicOrbitCurve(*common)
-        u = curve.pack(nodes, span, value)
-        if isinstance(curve, FamilyCurve):
-            curve.require_one(u)
-        curve = curve.anchored(u)
+        curve, u = _through_cycle(start, parameter, low, high)
     row = natural_constraint(u)
     try:
         u = newton_corrector(curve, u, row)
@@ -247,12 +220,54 @@ def _at(
         raise ModelError(f"the start cannot be followed: {reason}") from None
 
 
+def _through_rest(
+    start: Equilibrium, parameter: str, low: float, high: float
+) -> tuple[EquilibriumCurve, Floats]:
+    """Return the curve through an equilibrium, and its unknowns."""
+    flow = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state))
+    index = flow.index(parameter)
+    value = float(flow.values[index])
+    curve = EquilibriumCurve(flow, flow.values, index, unit_of(value, low, high))
+    return curve, curve.pack(flow.reduced(start.state), value)
+
+
+def _through_cycle(
+    start: PeriodicOrbit, parameter: str, low: float, high: float
+) -> tuple[PeriodicOrbitCurve, Floats]:
+    """Return the curve through a cycle, over a parameter of the model or along its family."""
+    if start._solved is None:
+        raise ModelError("this cycle was not made by udd.periodic_orbit")
+    old, v = start._solved
+    forcing = old.flow.forcing
+    given = flow_of(beyond_the_edge(start.model), np.atleast_2d(start.state), forcing=forcing)
+    family = parameter not in given.names
+    if family and forcing is not None:
+        raise ModelError(f"a forced cycle is followed over a parameter, not over {parameter}")
+    if forcing is not None:
+        require_period(given.model, forcing, given.kept, given.size, parameter)
+    flow, nodes, span = replace(old.flow, model=given.model), old.nodes(v), old.span(v)
+    index = HELD if family else flow.index(parameter)
+    quantity = Conserved.of(flow, parameter) if family and parameter != PERIOD else None
+    value = 0.0 if family else float(flow.values[index])
+    value = value if quantity is None else quantity.at(flow, nodes[0])[0]
+    shape = old.pieces, old.mirror, old.shift, old.reference, old.across, old.share
+    common = flow, flow.values, index, unit_of(value, low, high), span, *shape
+    if not family:
+        curve = PeriodicOrbitCurve(*common)
+        u = curve.pack(nodes, span, value)
+    else:
+        curve = of_family = FamilyCurve(*common, conserved=quantity)
+        u = curve.pack(nodes, span, value)
+        of_family.require_one(u)
+    return curve.anchored(u), u
+
+
 def branch_from(ways: list[BranchTrace], model: Model, parameter: str, begin: str) -> Branch:
     """Make a branch of one way, or of two that begin at the same place, the first of them reversed."""
     if len(ways) == 2:
         back, on = ways
         length = back.places[-1][3]
-        turned = [Station(c, CurvePoint(p.u, -p.tangent), s, length - a) for c, p, s, a in back.places[::-1]]
+        turned = [Station(c, p.reversed(), s, length - a) for c, p, s, a in back.places[::-1]]
         entries = [*turned[:-1], *(Station(c, p, s, length + a) for c, p, s, a in on.places)]
         points = [replace(p, arclength=length - p.arclength) for p in reversed(back.points)]
         points += [replace(p, arclength=length + p.arclength) for p in on.points]

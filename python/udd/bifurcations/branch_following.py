@@ -22,6 +22,7 @@ from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
     corrected_point,
+    guess_at,
     natural_constraint,
     newton_corrector,
     predictor_corrector_step,
@@ -216,10 +217,7 @@ class _Way(BranchTrace):
         if limits.low <= curve.value(there) <= limits.high:
             return False
         bound = limits.high if curve.value(place.u + gone * place.tangent) > limits.high else limits.low
-        guess = place.u.copy()
-        if place.tangent[-1] != 0.0:
-            guess = guess + place.tangent * ((bound / curve.scale - guess[-1]) / place.tangent[-1])
-        guess[-1] = bound / curve.scale
+        guess = guess_at(place, bound / curve.scale)
         with suppress(CorrectorFailed, IntegrationError):  # the last point is inside, then
             u = newton_corrector(curve, guess, natural_constraint(guess))
             last = CurvePoint(u, tangent_at(curve, u, place.tangent))

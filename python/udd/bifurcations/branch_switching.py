@@ -13,7 +13,7 @@ from .bifurcation_location import changes
 from .branch import AnyCurve, BifurcationPoint
 from .equilibrium_curve import EquilibriumCurve, expansion
 from .flow_map import Floats
-from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point, tangent_at
+from .pseudo_arclength import CorrectorFailed, CurvePoint, corrected_point, dense_equations, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
 
 __all__ = ["BIRTHS", "born_at", "doubled"]
@@ -30,10 +30,7 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
     The place's tangent leads away. The amplitude is halved until nothing more bifurcates between the point
     and the place.
 
-    Raises
-    ------
-    ModelError
-        A point where no branch is born, or where none is found.
+    ModelError: a point where no branch is born, or where none is found.
     """
     curve, place = point._curve, point._place
     if curve is None or place is None:
@@ -129,16 +126,13 @@ def _from_rest(curve: EquilibriumCurve, place: CurvePoint) -> tuple[PeriodicOrbi
 
 def _crossing(curve: AnyCurve, place: CurvePoint) -> tuple[AnyCurve, Floats, Floats]:
     """Return the other of two directions that the equations leave free."""
-    _, matrix = curve.equations(place.u)
-    dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
-    free = np.linalg.svd(dense)[2][-2:]
-    known = place.tangent
-    rest = free - np.outer(free @ known, known)
+    free = np.linalg.svd(dense_equations(curve, place.u)[1])[2][-2:]
+    rest = free - np.outer(free @ place.tangent, place.tangent)
     row = rest[np.argmax(np.linalg.norm(rest, axis=1))]
     return curve.anchored(place.u), place.u, row / np.linalg.norm(row)
 
 
-#: What makes the curve born at a bifurcation, by its kind: the curve, the solution there, and the direction.
+#: Functions for the curve that is born at a kind of bifurcation, the solution there, and the direction.
 BIRTHS: dict[str, Callable[[Any, CurvePoint], tuple[AnyCurve, Floats, Floats]]] = {
     "Hopf": _from_rest,
     "symmetry breaking": doubled,

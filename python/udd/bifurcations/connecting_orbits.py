@@ -11,7 +11,7 @@ from udd._util.drawable import Drawable
 from udd.errors import IntegrationError, ModelError
 
 from .boundary_value import ConnectingCurve
-from .branch import Branch
+from .branch import Branch, cycles_of
 from .equilibrium_curve import equilibrium_at
 from .equilibrium_search import refined
 from .error_bounds import COARSE, rounding_of
@@ -20,7 +20,6 @@ from .manifold_search import until_it_stands
 from .pseudo_arclength import CorrectorFailed
 from .saddle_node_cycles import saddle_node_on
 from .shooting_curve import PeriodicOrbitCurve
-from .solution_curve import HELD
 from .solutions import Equilibrium
 
 __all__ = ["Connection", "connection", "found_by"]
@@ -163,33 +162,18 @@ def connection(branch: Branch) -> Connection:
     >>> print(found.kind, round(found.value, 8), found.wild)
     homoclinic 4.25994905 False
     """
-    if not isinstance(branch, Branch) or branch.kind != "cycle":
-        raise ModelError("a branch of cycles is needed, of udd.continuation")
-    curve, place = branch._places[int(np.argmax(branch.periods))]
-    assert isinstance(curve, PeriodicOrbitCurve)
-    if curve.flow.forcing is not None:
-        raise ModelError("a forced model has no equilibria that an orbit could connect")
-    if curve.parameter == HELD:
-        raise ModelError(
-            f"a connection is looked for over a parameter of the model, not over {branch.parameter}"
-        )
-    fold = saddle_node_on(branch)
+    curve, u = cycles_of(branch)[int(np.argmax(branch.periods))]
+    fold = saddle_node_on(branch, curve, u)
     if fold is not None and isinstance(fold.solution, Equilibrium):
-        nodes, rest = curve.flow.full(curve.nodes(place.u)), fold.solution
-        t: Floats = np.linspace(0.0, curve.span(place.u), curve.pieces, endpoint=False)
+        nodes, rest = curve.flow.full(curve.nodes(u)), fold.solution
+        t: Floats = np.linspace(0.0, curve.span(u), curve.pieces, endpoint=False)
         away = np.linalg.norm(curve.flow.reduced(nodes - rest.state) / curve.flow.size, axis=1)
         return Connection("SNIC", branch.parameter, fold.value, fold.error, rest, t, nodes, float(away.min()))
-    return found_by(*through_cycle(curve, place.u), branch.parameter)
+    return found_by(*through_cycle(curve, u), branch.parameter)
 
 
 def found_by(curve: ConnectingCurve, guess: Floats, parameter: str) -> Connection:
-    """Return the connection near a guess, with the bound of its value.
-
-    Raises
-    ------
-    ModelError
-        No such orbit is near.
-    """
+    """Return the connection near a guess, with the bound of its value. ModelError: no such orbit is near."""
     try:
         (curve, u), error, _ = until_it_stands(
             curve.solved(guess),
@@ -221,10 +205,7 @@ def prolonged_and_solved(curve: ConnectingCurve, u: Floats) -> tuple[ConnectingC
 def through_cycle(curve: PeriodicOrbitCurve, u: Floats) -> tuple[ConnectingCurve, Floats]:
     """Return the curve and the unknowns of a long cycle, cut where it is nearest to an equilibrium.
 
-    Raises
-    ------
-    ModelError
-        It comes near no equilibrium.
+    ModelError: it comes near no equilibrium.
     """
     flow, values, nodes, m = curve.flow, curve.values_at(u), curve.nodes(u), curve.pieces
     rests = [refined(flow, values, nodes[i]) for i in np.argsort(curve.speeds(u))[:_TRIED]]

@@ -12,7 +12,7 @@ from .boundary_value import ConnectingCurve
 from .branch_continuation import unit_of
 from .connecting_orbits import Connection, found_by
 from .flow_map import Floats
-from .locus_points import LocusPlace, LocusTrace
+from .locus_points import LocusPlace, LocusTrace, outside
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
@@ -52,10 +52,7 @@ class ConnectionWay:
     def entered(self, start: Connection) -> Connection:
         """Return the connection where its curve enters the bounds of the second parameter; `start` if inside.
 
-        Raises
-        ------
-        ModelError
-            The curve does not lead to these bounds.
+        ModelError: the curve does not lead to these bounds.
         """
         if start._orbit is None:
             raise ModelError("this connection was not made by udd.connection or udd.connections")
@@ -126,26 +123,24 @@ class ConnectionWay:
 
     def _connection(self, curve: ConnectingCurve, u: Floats) -> Connection:
         """Return the connection with its bound, over the first parameter; over the second if that turns."""
-        pair = curve.free
+
+        def over(k: int) -> Connection:
+            scales = np.array([curve.scales[k], 1.0])
+            return found_by(*curve.over((curve.free[k], HELD), u, scales), self.parameters[k])
+
         try:
-            return found_by(
-                *curve.over((pair[0], HELD), u, np.array([curve.scales[0], 1.0])), self.parameters[0]
-            )
+            return over(0)
         except ModelError:
-            return found_by(
-                *curve.over((pair[1], HELD), u, np.array([curve.scales[1], 1.0])), self.parameters[1]
-            )
+            return over(1)
 
     def _bound(
         self, curve: ConnectingCurve, here: CurvePoint, there: CurvePoint
     ) -> tuple[float, float, int, Floats] | None:
         """Return the part of a step before a bound, the bound, the place of its parameter and the point."""
         before, after = curve.parameters(here.u), curve.parameters(there.u)
-        met = []
-        for k, (low, high) in enumerate(self.box.tolist()):
-            if not low <= after[k] <= high:
-                bound = low if after[k] < low else high
-                met.append(((bound - before[k]) / (after[k] - before[k]), k, bound))
+        met = [
+            ((bound - before[k]) / (after[k] - before[k]), k, bound) for k, bound in outside(after, self.box)
+        ]
         if not met:
             return None
         part, k, bound = min(met)

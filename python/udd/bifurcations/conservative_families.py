@@ -47,10 +47,7 @@ class Conserved:
     def of(cls, flow: FlowMap, text: str) -> Conserved:
         """Return the quantity with this formula.
 
-        Raises
-        ------
-        ModelError
-            A formula that cannot be used, or a quantity that changes along the motion.
+        ModelError: a formula that cannot be used, or a quantity that changes along the motion.
         """
         model = flow.model
         states = list(model.state_names)
@@ -161,12 +158,7 @@ class FamilyCurve(PeriodicOrbitCurve):
         return gradient / np.linalg.norm(gradient)
 
     def require_one(self, u: Floats) -> None:
-        """Refuse cycles that do not come in a family of one dimension.
-
-        Raises
-        ------
-        ModelError
-        """
+        """Refuse cycles that do not come in a family of one dimension."""
         _, sizes = self.kept_quantities(u)
         kept = int((sizes < _FREE * sizes[0]).sum())
         if kept == 0:

@@ -20,7 +20,7 @@ from udd.errors import IncompleteWarning, IntegrationError, ModelError
 from .branch import Branch, cycles_of
 from .flow_map import Floats, FlowMap
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
-from .saddle_cycles import SaddleCycle, saddle_at
+from .saddle_cycles import SaddleCycle, saddle_at, saddles_of
 from .solutions import PeriodicOrbit
 from .transient_lifetimes import first_stay
 
@@ -208,15 +208,8 @@ class _Search:
 
     def crises(self) -> list[Crisis]:
         """Return those between neighbouring cycles of the branch of which one side is shut in."""
-        marks: list[tuple[SaddleCycle, bool] | None] = []
-        last: SaddleCycle | None = None
-        for cycle in cycles_of(self.branch):
-            saddle = SaddleCycle.of(*cycle)
-            if saddle is None or saddle.multiplier < _SLOW:
-                marks.append(None)
-                continue
-            last = saddle = saddle.facing(last)
-            marks.append((saddle, self._passages(saddle).crossed))
+        saddles = saddles_of(self.branch, least=_SLOW)
+        marks = (None if saddle is None else (saddle, self._passages(saddle).crossed) for saddle in saddles)
 
         def located(a: tuple[SaddleCycle, bool], b: tuple[SaddleCycle, bool]) -> Crisis:
             return self._located(a[0], b[0]) if b[1] else self._located(b[0], a[0])

@@ -26,10 +26,7 @@ _ROUNDS = 40.0  # periods of the Hopf bifurcation, up to which its cycles are fo
 def fold_of_cycles_at(point: LocusPoint, bounds: Sequence[float]) -> BifurcationPoint:
     """Return the fold of the cycles near a Bautin point, at a nearby value of the second parameter.
 
-    Raises
-    ------
-    ModelError
-        None is found.
+    ModelError: none is found.
     """
     inner = -point.coefficients["l2"]
     for hopf in _hopf_points(point):
@@ -45,10 +42,7 @@ def fold_of_cycles_at(point: LocusPoint, bounds: Sequence[float]) -> Bifurcation
 def homoclinic_at(point: LocusPoint, bounds: Sequence[float]) -> Connection:
     """Return the homoclinic orbit in which the cycles near a Bogdanov-Takens point end.
 
-    Raises
-    ------
-    ModelError
-        None is found.
+    ModelError: none is found.
     """
     for hopf in _hopf_points(point):
         cycles = continuation(hopf, hopf.parameter, bounds, max_period=_ROUNDS * hopf.period, max_points=400)

@@ -19,7 +19,7 @@ from .equilibrium_search import refined
 from .flow_map import Floats, FlowMap
 from .invariant_manifolds import AWAY, FAR, FINE, LEAVES, direction_alone
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
-from .saddle_cycles import SaddleCycle, saddle_at
+from .saddle_cycles import SaddleCycle, saddle_at, saddles_of
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["CycleConnection", "cycle_connections"]
@@ -152,12 +152,9 @@ class _Search:
     def connections(self) -> list[CycleConnection]:
         """Return those between neighbouring cycles of the branch that are passed on two sides."""
         passages: list[_Passage | None] = []
-        last: SaddleCycle | None = None
-        for cycle in cycles_of(self.branch):
-            saddle = SaddleCycle.of(*cycle, self.time > 0.0)
+        for saddle in saddles_of(self.branch, self.time > 0.0):
             passages.append(None)
             if saddle is not None:
-                last = saddle = saddle.facing(last)
                 with suppress(IntegrationError):  # it goes away for good
                     passages[-1] = self._passage(saddle)
 

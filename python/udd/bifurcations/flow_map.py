@@ -179,10 +179,7 @@ class FlowMap:
 def flow_of(model: Model, states: Floats, forcing: Forcing | None = None) -> FlowMap:
     """Return the flow of a model near these states (n, dim).
 
-    Raises
-    ------
-    ModelError
-        The rates depend on time and no `forcing` is given, or do not repeat after its period.
+    ModelError: the rates depend on time and no `forcing` is given, or do not repeat after its period.
     """
     require_model(model)
     # A component that happens to be small is no smaller than a tenth of the largest.

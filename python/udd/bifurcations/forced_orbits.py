@@ -98,12 +98,7 @@ def mirror_of(model: Model, kept: NDArray[np.intp], size: Floats, period: float)
 def require_period(
     model: Model, forcing: Forcing, kept: NDArray[np.intp], size: Floats, varied: str | None = None
 ) -> None:
-    """Refuse a period that is not that of the forcing, or not where the parameter `varied` is another.
-
-    Raises
-    ------
-    ModelError
-    """
+    """Refuse a period that is not that of the forcing, or not where the parameter `varied` is another."""
     if varied is not None:
         value = model.parameters[varied]
         model = model.with_parameters({varied: value + _ASIDE * (abs(value) or 1.0)})

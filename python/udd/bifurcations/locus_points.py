@@ -25,7 +25,16 @@ from .pseudo_arclength import CorrectorFailed, zero_between
 from .solution_surface import SolutionSurface, SurfacePoint
 from .solutions import Equilibrium, PeriodicOrbit
 
-__all__ = ["ENDS", "LocusPlace", "LocusPoint", "LocusTrace", "Segment", "points_between", "watched_functions"]
+__all__ = [
+    "ENDS",
+    "LocusPlace",
+    "LocusPoint",
+    "LocusTrace",
+    "Segment",
+    "outside",
+    "points_between",
+    "watched_functions",
+]
 
 _NEAR = 1e-4  # Radians in a typical time, or from 1: a pair this near to the axis is real.
 _ZERO = 1e-3  # Size of a function at its zero, relative to its values before and after.
@@ -116,6 +125,12 @@ class LocusTrace:
     places: list[LocusPlace]
     points: list[LocusPoint] = field(default_factory=list)
     end: str = ""
+
+
+def outside(values: Floats, box: Floats) -> list[tuple[int, float]]:
+    """Return which parameters have left their bounds (k, 2), and these bounds."""
+    pairs = zip(values.tolist(), box.tolist(), strict=True)
+    return [(k, low if v < low else high) for k, (v, (low, high)) in enumerate(pairs) if not low <= v <= high]
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,20 +51,10 @@ def converge(
 ) -> tuple[Floats, float, int]:
     """Solve with more and more rounds about a cycle, then with poorer accuracy.
 
-    Parameters
-    ----------
-    solve : callable
-        Returns the unknowns for a guess, a number of rounds, the value's expected change, and an accuracy.
-    x : ndarray
-        The guess: the parameter's value, then other unknowns.
-
-    Returns
-    -------
-    x : ndarray
-    error : float
-        A bound of the value's error: the change with the last round, with runs a hundred times less accurate,
-        and with a start ten times further from the source.
-    rounds : int
+    `solve` takes the unknowns (the parameter's value, then others), a number of rounds, the value's expected
+    change, and an accuracy. Returned are the unknowns, a bound of the value's error, and the rounds. The
+    bound is the change with the last round, with runs a hundred times less accurate, and with a start ten
+    times further from the source.
     """
     x, moved, rounds = until_it_stands(
         x, lambda y, k, moved: solve(y, k, moved, accuracy), lambda y: float(y[0]), step, _ROUNDS
@@ -100,10 +90,7 @@ def secant(height: Callable[[Floats], tuple[float, Floats]], x: Floats, step: fl
 
     `height` returns the height at a value, and the unknowns with the others adjusted to that value.
 
-    Raises
-    ------
-    ModelError
-        The values leave the range of 20 steps.
+    ModelError: the values leave the range of 20 steps.
     """
     start, step = float(x[0]), max(step, 1e-8 * abs(x[0]))
     before, a = height(x)

@@ -29,24 +29,10 @@ _FARTHEST = 1e4  # Largest ratio of the expected square to that of the first amp
 def next_doubling(point: BifurcationPoint, ahead: float, amplitude: float) -> Branch:
     """Return the branch born at a doubling, up to the doubling of its own: a few points of it.
 
-    Parameters
-    ----------
-    point : BifurcationPoint
-        A period doubling.
-    ahead : float
-        About how far off the next one is, in the parameter.
-    amplitude : float
-        A small one, at which the branch is looked for first.
-
-    Raises
-    ------
-    CorrectorFailed
-        It is not there.
-
-    Notes
-    -----
+    The next one is about `ahead` off in the parameter; the branch is looked for first at a small `amplitude`.
     By the normal form, parameter and multiplier are nearly linear in the square of the amplitude. The bend of
     the parameter says where the next doubling is expected, and the secant method finds the multiplier -1.
+    CorrectorFailed: it is not there.
     """
     curve, start = point._curve, point._place
     if not isinstance(curve, PeriodicOrbitCurve) or start is None:

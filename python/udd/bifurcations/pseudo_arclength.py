@@ -18,6 +18,8 @@ __all__ = [
     "Curve",
     "CurvePoint",
     "corrected_point",
+    "dense_equations",
+    "guess_at",
     "natural_constraint",
     "nearest_of_family",
     "newton",
@@ -69,6 +71,10 @@ class CurvePoint:
     u: Floats
     tangent: Floats
 
+    def reversed(self) -> CurvePoint:
+        """Return the point in the other direction."""
+        return CurvePoint(self.u, -self.tangent)
+
 
 def solve(matrix: Floats | Matrix, row: Floats, right: Floats) -> Floats:
     """Return the solution of the equations below which one more row stands."""
@@ -87,11 +93,26 @@ def solve(matrix: Floats | Matrix, row: Floats, right: Floats) -> Floats:
     return result
 
 
+def dense_equations(curve: Curve, u: Floats) -> tuple[Floats, Floats]:
+    """Return the residuals and their derivatives as an array."""
+    residual, matrix = curve.equations(u)
+    return residual, matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+
+
 def natural_constraint(u: Floats) -> Floats:
     """Return the row that fixes the parameter, which is the last of the unknowns."""
     row = np.zeros(len(u))
     row[-1] = 1.0
     return row
+
+
+def guess_at(place: CurvePoint, last: float, least: float = 0.0) -> Floats:
+    """Return the point of a tangent with this parameter; the place itself if the parameter stands still."""
+    guess = place.u.copy()
+    if abs(place.tangent[-1]) > least:
+        guess = guess + place.tangent * ((last - guess[-1]) / place.tangent[-1])
+    guess[-1] = last
+    return guess
 
 
 def newton(
@@ -159,8 +180,7 @@ def nearest_of_family(
     """
 
     def step_at(u: Floats) -> Floats:
-        residual, matrix = curve.equations(u)
-        dense = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+        residual, dense = dense_equations(curve, u)
         full, right = np.vstack([dense, row]), np.append(-residual, row @ (guess - u))
         return np.asarray(np.linalg.lstsq(full, right, rcond=singular)[0], dtype=np.float64)
 
@@ -180,10 +200,7 @@ def predictor_corrector_step(
 ) -> tuple[CurvePoint, float, float]:
     """Return the next point along the curve, its distance, and the step to be tried next.
 
-    Raises
-    ------
-    CorrectorFailed
-        No step longer than `shortest` finds one.
+    CorrectorFailed: no step longer than `shortest` finds one.
     """
     reason = "the curve turns too sharply"
     while step >= shortest:

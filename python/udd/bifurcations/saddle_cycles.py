@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,12 +10,12 @@ import numpy as np
 
 from udd.errors import ModelError
 
-from .branch import Branch
+from .branch import Branch, cycles_of
 from .flow_map import Floats, FlowMap
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import PeriodicOrbit
 
-__all__ = ["SaddleCycle", "saddle_at"]
+__all__ = ["SaddleCycle", "saddle_at", "saddles_of"]
 
 _LANDINGS = 20  # Newton steps to the plane at most
 
@@ -122,13 +123,22 @@ class SaddleCycle:
         return x
 
 
+def saddles_of(branch: Branch, growing: bool = True, least: float = 0.0) -> Iterator[SaddleCycle | None]:
+    """Yield the saddle cycles of a branch with vectors that change smoothly; None for its other cycles."""
+    last: SaddleCycle | None = None
+    for cycle in cycles_of(branch):
+        saddle = SaddleCycle.of(*cycle, growing)
+        if saddle is None or saddle.multiplier < least:
+            yield None
+        else:
+            last = saddle.facing(last)
+            yield last
+
+
 def saddle_at(branch: Branch, value: float, like: SaddleCycle, growing: bool = True) -> SaddleCycle:
     """Return the saddle cycle of a branch at a value of the parameter that is nearest to another one.
 
-    Raises
-    ------
-    ModelError
-        The branch has none there.
+    ModelError: the branch has none there.
     """
     cycles = [orbit for orbit in branch.at(value) if isinstance(orbit, PeriodicOrbit)]
     for orbit in sorted(cycles, key=lambda orbit: float(like.distance(like.flow.reduced(orbit.state)))):

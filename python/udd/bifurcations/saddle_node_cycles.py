@@ -21,20 +21,16 @@ _GROWN = 1.2  # Growth of the period over the places that are compared.
 _AGREES = 1.3  # Largest factor by which the square of the period times the distance changes.
 
 
-def saddle_node_on(branch: Branch) -> BifurcationPoint | None:
-    """Find the fold of equilibria at which the longest cycles of a branch end, or None.
+def saddle_node_on(branch: Branch, curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
+    """Find the fold of equilibria at which the longest cycles of a branch end, or None; `u` is the longest.
 
     The period grows there with the inverse square root of the distance in the parameter, not with its
     logarithm, as towards an orbit homoclinic to a saddle.
     """
-    longest = int(np.argmax(branch.periods))
-    curve, place = branch._places[longest]
-    if not isinstance(curve, PeriodicOrbitCurve):
-        return None
-    fold = _fold_near(curve, place.u)
+    fold = _fold_near(curve, u)
     if fold is None:
         return None
-    near = np.flatnonzero(branch.periods >= branch.periods[longest] / _GROWN**3)
+    near = np.flatnonzero(branch.periods >= branch.periods.max() / _GROWN**3)
     away, periods = np.abs(branch.values[near] - fold.value), branch.periods[near]
     if periods.max() < _GROWN * periods.min():
         return None
@@ -49,7 +45,6 @@ def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
 
     def equations(y: Floats) -> Floats:
         residual, matrix = rests.equations(y)
-        assert isinstance(matrix, np.ndarray)
         return np.append(residual, np.linalg.det(matrix[:, :-1]))
 
     try:

@@ -127,10 +127,7 @@ class SolutionSurface:
     ) -> SurfacePoint:
         """Return the zero of a test function on the line through a guess along a direction (2,) of a plane.
 
-        Raises
-        ------
-        CorrectorFailed
-            There is none within `reach`.
+        CorrectorFailed: there is none within `reach`.
         """
         points: dict[float, SurfacePoint] = {}
         across = base.ahead(normal)
