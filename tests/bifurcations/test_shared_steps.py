@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import udd
-from udd.bifurcations.manifold_search import Accuracy, brackets, converge, secant
-from udd.bifurcations.pseudo_arclength import zero_between
+from udd.bifurcations.locus_points import outside
+from udd.bifurcations.manifold_search import Accuracy, brackets, converge, secant, until_it_stands
+from udd.bifurcations.pseudo_arclength import CurvePoint, guess_at, zero_between
 from udd.errors import ModelError
 
 
@@ -43,6 +44,30 @@ def test_the_bound_covers_what_distance_and_tolerance_change(
     x, error, _ = converge(solve, np.array([2.1]), 0.1, Accuracy(1e-6))
     assert abs(x[0] - 2.0) <= error < 1e-6
     assert error > 9.0 * per_distance * 1e-6 + 98.0 * per_tolerance
+
+
+def test_a_solution_is_improved_until_its_value_stands() -> None:
+    # Newton's method for the square root of 2, with the rounds that it has seen.
+    def improve(x: list[float], k: int, moved: float) -> list[float]:
+        return [0.5 * (x[0] + 2.0 / x[0]), k]
+
+    root, moved, rounds = until_it_stands([1.0, 0.0], improve, lambda x: x[0], np.nan, 20)
+    assert root == [pytest.approx(2.0**0.5, rel=1e-15), rounds]
+    assert rounds < 8 and moved < 1e-12
+    assert until_it_stands([1.0, 0.0], improve, lambda x: x[0], np.nan, 2)[2] == 2
+
+
+def test_a_tangent_leads_to_a_value_unless_the_parameter_stands() -> None:
+    place = CurvePoint(np.array([1.0, 2.0]), np.array([0.6, 0.8]))
+    assert guess_at(place, 2.4) == pytest.approx([1.3, 2.4])
+    assert guess_at(place, 2.4, least=0.9) == pytest.approx([1.0, 2.4])
+    assert guess_at(place.reversed(), 2.4) == pytest.approx([1.3, 2.4])
+
+
+def test_parameters_outside_their_bounds_are_listed() -> None:
+    box = np.array([[0.0, 1.0], [-1.0, np.inf]])
+    assert outside(np.array([0.5, 3.0]), box) == []
+    assert outside(np.array([1.5, -2.0]), box) == [(0, 1.0), (1, -1.0)]
 
 
 def test_a_zero_comes_with_its_place() -> None:

@@ -23,7 +23,7 @@ from .branch_ends import hopf_end
 from .branch_following import CLOSED
 from .connecting_orbits import Connection
 from .connection_curves import ConnectionWay
-from .curves_born_at import fold_of_cycles_at, homoclinic_at
+from .curves_born_at import BORN_AT
 from .flow_map import Floats
 from .locus_points import (
     ENDS,
@@ -202,11 +202,9 @@ def locus(
         parameter = point.parameters[1] if parameter is None else parameter
         if parameter != point.parameters[1]:
             raise ModelError(f"the curve born there is one over {point.parameters[1]}, not {parameter}")
-        if point.kind not in ("Bautin", "Bogdanov-Takens"):
+        if point.kind not in BORN_AT:
             raise ModelError(f"no curve is born at a {point.kind} point that could be followed")
-        limits = bounds_of(within)
-        bautin = point.kind == "Bautin"
-        point = fold_of_cycles_at(point, limits) if bautin else homoclinic_at(point, limits)
+        point = BORN_AT[point.kind](point, bounds_of(within))
     if parameter is None:
         raise ModelError("say which second parameter is varied")
     if isinstance(point, BifurcationPoint | Connection) and parameter == point.parameter:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .locus_points import LocusPoint
 from .pseudo_arclength import CorrectorFailed
 from .solution_surface import SurfacePoint
 
-__all__ = ["fold_of_cycles_at", "homoclinic_at"]
+__all__ = ["BORN_AT"]
 
 _STEPS = (0.1, 0.2, 0.05, 0.4, 0.02)  # along the curve of Hopf points, in scaled unknowns
 _ROUNDS = 40.0  # periods of the Hopf bifurcation, up to which its cycles are followed
@@ -88,3 +88,10 @@ def _as_hopf(there: SurfacePoint) -> list[BifurcationPoint]:
     if abs(pair.imag) * there.curve.flow.clock < 1e-4 or abs(pair.real) > 1e-6 * abs(pair.imag):
         return []
     return [point_at(there.curve, "Hopf", there.place, signs)]
+
+
+#: Functions for a point of the curve that is born at a kind of point of codimension two.
+BORN_AT: dict[str, Callable[[LocusPoint, Sequence[float]], BifurcationPoint | Connection]] = {
+    "Bautin": fold_of_cycles_at,
+    "Bogdanov-Takens": homoclinic_at,
+}

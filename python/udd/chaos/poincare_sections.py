@@ -368,35 +368,25 @@ def poincare(
     columns = raw["t"].shape[1]  # as many as were asked for, or were found until Ctrl-C
     which = np.where(np.arange(columns) < numbers[:, None], raw["which"].astype(np.int64), -1)
     words = tuple(next(word for word, sign in _DIRECTIONS.items() if sign == way) for way in ways)
-    if shape == ():
-        single = int(numbers[0])
-        made = Section(
-            raw["t"][0, :single],
-            raw["points"][0, :single],
-            which[0, :single],
-            surfaces,
-            words,
-            single,
-            float(raw["residual"][0]),
-            str(names[0]),
-            raw["end"][0],
-            float(raw["t_end"][0]),
-            model,
-        )
-    else:
-        made = Section(
-            raw["t"].reshape(*shape, columns),
-            raw["points"].reshape(*shape, columns, len(model.state_names)),
-            which.reshape(*shape, columns),
-            surfaces,
-            words,
-            numbers.reshape(shape),
-            raw["residual"].reshape(shape),
-            names.reshape(shape),
-            raw["end"].reshape(*shape, -1),
-            raw["t_end"].reshape(shape),
-            model,
-        )
+    # A single orbit has plain numbers, and no room for points that it does not have.
+    last = columns if shape else int(numbers[0])
+
+    def of_orbits(values: NDArray[Any]) -> Any:
+        return values.reshape(shape) if shape else values[0].item()
+
+    made = Section(
+        raw["t"].reshape(*shape, columns)[..., :last],
+        raw["points"].reshape(*shape, columns, len(model.state_names))[..., :last, :],
+        which.reshape(*shape, columns)[..., :last],
+        surfaces,
+        words,
+        of_orbits(numbers),
+        of_orbits(raw["residual"]),
+        of_orbits(names),
+        raw["end"].reshape(*shape, -1),
+        of_orbits(raw["t_end"]),
+        model,
+    )
     _tell(raw["outcome"], numbers, count, made, chosen["partial"])
     warn_of_some(model, rows, starts, raw["t_end"], rtol, atol)
     return made

@@ -62,8 +62,9 @@ class Spectrum(Drawable):
         an orbit that escapes.
     verdict : {"chaos", "periodic orbit", "torus", "equilibrium", "escapes", "undecided"}
         Final motion of the orbit. Neither the origin nor the size of the motion matters. At an equilibrium
-        the orbit comes nearer to it for several times its slowest decay. A periodic orbit comes back, modulo
-        turns of angles, and one exponent is zero; a running pendulum is one. An orbit that escapes has a
+        the orbit comes nearer to it for several times its slowest decay, or the rates in its only slow
+        direction lead to it, however slowly. A periodic orbit comes back, modulo turns of angles, and one
+        exponent is zero; a running pendulum is one. An orbit that escapes has a
         component, not an angle, that grows without bound. Chaos has a largest exponent at least four standard
         errors above zero, and neighbours that part faster than as the square of the time (in typical times);
         in a plane there is none. A torus (quasiperiodic motion) has two exponents or more that are smaller
