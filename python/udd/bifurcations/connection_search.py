@@ -21,45 +21,27 @@ from udd.simulation.trajectory import simulate
 from .boundary_value import ConnectingCurve
 from .branch_continuation import bounds_of
 from .connecting_orbits import Connection, found_by
-from .equilibrium_search import equilibria, refined
+from .equilibrium_search import equilibria
 from .flow_map import Floats, FlowMap, flow_of
-from .invariant_manifolds import FAR, FINE, LEAVES, Eigendirection, direction_alone
+from .invariant_manifolds import FINE
+from .manifold_curves import NARROW, ManifoldCurve, ManifoldFamily
 from .manifold_search import brackets
 from .solutions import FoundList
 
 __all__ = ["Connections", "connections"]
 
 _ASIDE = 1e-3  # Distance from equilibria, in typical sizes, at which runs begin that show the extent.
-_LEFT = 0.1  # Distance at which the manifold has left the equilibrium.
 _SHOWN = 20.0  # Typical times that show the extent of the motion.
 _BEND = 3.0  # Typical sizes beyond which distances count less and less.
 _APART = 0.6  # Distance up to which curves are alike.
 _NEAR = 1.0  # Largest distance of a passage.
-_LOOSE = 10.0  # Tolerance of the runs, relative to 1e-13.
 _CLOSE = 3e-2  # Distance of a passage from which Newton's method starts.
 _TRIED = 1e-6  # Width of an interval from which it starts as well: slow spirals come nearer slowly.
-_NARROW = 1e-12  # Relative width of the narrowest interval that is cut.
 _BESIDE = 1e3  # Widths of an interval within which two connections of one time are the same.
 _SOONER = 0.5  # Typical times by which these times differ at most.
-_TRIES = 4  # Guesses of an equilibrium besides the first.
 _PARTS = 4  # Parts into which an interval is cut.
 _MOST = 60_000  # Largest number of marks that are compared.
-_ROWS = 2000  # Curves that are followed together.
 _SAME = 1e-11  # Relative distance of two results for one connection.
-
-
-@dataclass(frozen=True, eq=False)
-class _Curve:
-    """One side of an equilibrium's manifold of one dimension: states (k, r) at equal distances of time.
-
-    With the left eigenvector that tells the side of the other manifold, and the first state that has left.
-    """
-
-    value: float
-    rest: Floats
-    left: Floats
-    path: Floats
-    left_at: float
 
 
 @dataclass(frozen=True)
@@ -75,6 +57,7 @@ class _Part:
     distance: float
 
 
+_Pair = tuple[ManifoldCurve, ManifoldCurve]
 _Located = tuple[int, Connection]  # when it came near the equilibrium at its end
 
 
@@ -171,7 +154,7 @@ def connections(
             own = mirror is not None and np.allclose(mirror * rest, rest, atol=1e-9)
             if sign < 0.0 and own:
                 continue  # so are the two sides of this one
-            manifold = _Manifold(flow, index, grid, rest, sign, span)
+            manifold = _Scan(ManifoldFamily(flow, index, sign, span), grid, rest)
             followed += manifold.exists
             its, ended = manifold.connections(parameter)
             located += [one for one in its if not any(_same(one, other) for other in located)]
@@ -206,99 +189,20 @@ def _extent(model: Model, rests: list[Floats]) -> Floats:
     return states[np.isfinite(states).all(axis=1)]
 
 
-class _Manifold:
-    """One side of an equilibrium's manifold of one dimension, at all values of the parameter."""
+class _Scan:
+    """A family of manifolds at the values of a grid, and the equilibria there."""
 
-    def __init__(
-        self, flow: FlowMap, index: int, grid: Floats, rest: Floats, sign: float, longest: float
-    ) -> None:
-        self.flow, self.index, self.grid, self.sign, self.longest = flow, index, grid, sign, longest
+    def __init__(self, family: ManifoldFamily, grid: Floats, rest: Floats) -> None:
+        self.family, self.flow, self.grid = family, family.flow, grid
         self.rests: list[Floats | None] = [None] * len(grid)
         middle = len(grid) // 2
         for way in (range(middle, len(grid)), range(middle - 1, -1, -1)):
             guess: Floats | None = rest
             for i in way:
-                guess = None if guess is None else self.rest_near(grid[i], guess)
+                guess = None if guess is None else family.rest_near(grid[i], guess)
                 self.rests[i] = guess
         here = self.rests[middle]
-        self.exists = here is not None and self.alone(grid[middle], here) is not None
-
-    def values_at(self, value: float) -> Floats:
-        values = self.flow.values.copy()
-        values[self.index] = value
-        return values
-
-    def rest_near(self, value: float, guess: Floats) -> Floats | None:
-        """Return the equilibrium near a guess; if Powell's method stalls, start next to the guess."""
-        aside = np.random.default_rng(8).uniform(-_ASIDE, _ASIDE, (_TRIES, len(guess)))
-        for shift in (np.zeros(len(guess)), *aside):
-            found = refined(self.flow, self.values_at(value), guess + shift * self.flow.size)
-            if found is not None:
-                return found
-        return None
-
-    def alone(self, value: float, rest: Floats) -> Eigendirection | None:
-        """Return the only eigendirection on its side, a growing one first; none if there are several."""
-        values = self.values_at(value)
-        for side in (1.0, -1.0):
-            one = direction_alone(self.flow, values, rest, side)
-            if one is not None:
-                return one
-        return None
-
-    def curves(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
-        """Return the curve at each value, from near the equilibrium until it has gone far or time is up."""
-        found: list[_Curve] = []
-        for first in range(0, len(values), _ROWS):
-            part = slice(first, first + _ROWS)
-            found += self._followed(values[part], rests[part])
-        return found
-
-    def _followed(self, values: Floats, rests: list[Floats]) -> list[_Curve]:
-        flow, step = self.flow, self.flow.clock / FINE
-        size, count = flow.size, len(values)
-        ways = [self.alone(value, rest) for value, rest in zip(values.tolist(), rests, strict=True)]
-        center, left = np.array(rests), np.zeros((count, flow.dim))
-        x, time = center.copy(), np.ones(count)
-        for i, way in enumerate(ways):
-            if way is not None:
-                x[i] = way.start(flow, rests[i], self.sign)
-                time[i], left[i] = np.sign(way.number), way.left
-        rows = np.tile(flow.values, (count, 1))
-        rows[:, self.index] = values
-        going = np.array([way is not None for way in ways])
-        states, away_at, end = [x.copy()], np.full(count, np.inf), np.zeros(count, dtype=np.intp)
-        # Between values that are hardly apart it is seen late on which side an equilibrium is passed.
-        rates = [abs(way.number) for way in ways if way is not None]
-        lasts = self.longest - float(np.log(_NARROW)) / min(rates, default=1.0)
-        most = FINE * (LEAVES + lasts / flow.clock)
-        require_memory("states of curves up to t_max", most, count, flow.dim, itemsize=16)
-        for k in range(1, round(most)):
-            rows_left = np.flatnonzero(going)
-            if not len(rows_left):
-                break
-            x[rows_left] = self._on(rows[rows_left], x[rows_left], time[rows_left] * step)
-            states.append(x.copy())
-            end[rows_left] = k
-            scaled = np.linalg.norm((x - center) / size, axis=1)
-            away_at = np.where(going & (scaled > _LEFT), np.minimum(away_at, k), away_at)
-            going &= (scaled < FAR) & ((k - away_at) * step < lasts)
-        path = np.array(states)
-        return [
-            _Curve(value, rests[i], left[i], path[: end[i] + 1, i], away_at[i])
-            for i, value in enumerate(values.tolist())
-        ]
-
-    def _on(self, rows: Floats, x: Floats, spans: Floats) -> Floats:
-        """Return the states a step later; infinite where the run blows up."""
-        try:
-            return self.flow.fly_each(rows, x, spans, _LOOSE)
-        except IntegrationError:
-            if len(x) == 1:
-                return np.full_like(x, np.inf)
-        half = len(x) // 2
-        parts = (slice(None, half), slice(half, None))
-        return np.concatenate([self._on(rows[part], x[part], spans[part]) for part in parts])
+        self.exists = here is not None and family.alone(grid[middle], here) is not None
 
     def connections(self, parameter: str) -> tuple[list[Connection], bool]:
         """Return those at which the curve changes its course, and True if the search is complete."""
@@ -307,8 +211,8 @@ class _Manifold:
             return [], True
         # If the equilibrium is lost between two values, nothing is compared.
         there = [k for k, rest in enumerate(self.rests) if rest is not None]
-        marks: list[_Curve | None] = [None] * len(self.grid)
-        curves = self.curves(self.grid[there], [rest for rest in self.rests if rest is not None])
+        marks: list[ManifoldCurve | None] = [None] * len(self.grid)
+        curves = self.family.curves(self.grid[there], [rest for rest in self.rests if rest is not None])
         for k, curve in zip(there, curves, strict=True):
             marks[k] = curve
         compared = 0
@@ -318,18 +222,18 @@ class _Manifold:
             compared += len(marks)
         return [connection for _, connection in located], not marks
 
-    def _cut(self, pairs: list[tuple[_Curve, _Curve]]) -> list[_Curve | None]:
+    def _cut(self, pairs: list[_Pair]) -> list[ManifoldCurve | None]:
         """Return the marks of wide intervals that are cut, with None after each."""
-        pairs = [(a, b) for a, b in pairs if b.value - a.value > _NARROW * max(abs(a.value), abs(b.value))]
+        pairs = [(a, b) for a, b in pairs if b.value - a.value > NARROW * max(abs(a.value), abs(b.value))]
         values = np.array([np.linspace(a.value, b.value, _PARTS + 1)[1:-1] for a, b in pairs]).ravel()
         guesses = [a.rest for a, _ in pairs for _ in range(_PARTS - 1)]
-        rests = [self.rest_near(v, guess) for v, guess in zip(values.tolist(), guesses, strict=True)]
+        rests = [self.family.rest_near(v, guess) for v, guess in zip(values.tolist(), guesses, strict=True)]
         curves = iter(
-            self.curves(values, [x if y is None else y for x, y in zip(guesses, rests, strict=True)])
+            self.family.curves(values, [x if y is None else y for x, y in zip(guesses, rests, strict=True)])
         )
         return [m for a, b in pairs for m in (a, *islice(curves, _PARTS - 1), b, None)]
 
-    def _part(self, a: _Curve, b: _Curve) -> _Part | None:
+    def _part(self, a: ManifoldCurve, b: ManifoldCurve) -> _Part | None:
         """Return the passage at which two curves part; None if they stay alike."""
         flow = self.flow
         many = min(len(a.path), len(b.path))
@@ -339,7 +243,7 @@ class _Manifold:
         if not len(apart) or not left < apart[0]:
             return None
         first, last = int(left) + 1, int(apart[0])
-        latest = left + FINE * self.longest / flow.clock
+        latest = left + FINE * self.family.longest / flow.clock
         best = None
         for image, mirror in enumerate(flow.images):
             if image and np.allclose(mirror * a.rest, a.rest, atol=1e-9):
@@ -357,7 +261,9 @@ class _Manifold:
         part = best or _Part(last, last, False, np.inf)
         return part if part.came <= latest else None
 
-    def _tried(self, parameter: str, located: list[_Located], a: _Curve, b: _Curve) -> tuple[_Curve, _Curve]:
+    def _tried(
+        self, parameter: str, located: list[_Located], a: ManifoldCurve, b: ManifoldCurve
+    ) -> tuple[ManifoldCurve, ManifoldCurve]:
         """Return curves that part; add the connection between them. ModelError: they take one course."""
         part, width = self._part(a, b), b.value - a.value
         if part is None:
@@ -374,27 +280,28 @@ class _Manifold:
             with suppress(ModelError, IntegrationError):
                 new = self._solved(a, part.nearest, part.image, parameter)
                 inside = self.grid[0] <= new.value <= self.grid[-1]
-                if inside and abs(new.value - a.value) <= 2.0 * beside:
-                    located += [] if any(_same(new, other) for _, other in located) else [(part.came, new)]
+                again = any(_same(new, other) for _, other in located)
+                if inside and not again and abs(new.value - a.value) <= 2.0 * beside:
+                    located.append((part.came, new))
         return a, b
 
-    def _solved(self, curve: _Curve, last: int, image: bool, parameter: str) -> Connection:
+    def _solved(self, curve: ManifoldCurve, last: int, image: bool, parameter: str) -> Connection:
         flow, step = self.flow, self.flow.clock / FINE
         pieces = flow.pieces_for(last * step)
         every = max(1, last // pieces)
         where = np.arange(last % every, last + 1, every)
         nodes, span = curve.path[where], float((len(where) - 1) * every * step)
         mirror = flow.images[int(image)]
-        rest, way = curve.rest, self.alone(curve.value, curve.rest)
+        rest, way = curve.rest, self.family.alone(curve.value, curve.rest)
         if way is not None and way.number < 0.0:
             # Followed backward: the orbit comes from the target.
             nodes, rest = nodes[::-1].copy(), mirror * rest
-        values = self.values_at(curve.value)
-        guess = ConnectingCurve.through(flow, values, self.index, rest, mirror, nodes, span)
+        values = self.family.values_at(curve.value)
+        guess = ConnectingCurve.through(flow, values, self.family.index, rest, mirror, nodes, span)
         return found_by(*guess, parameter)
 
 
-def _both_leave(a: _Curve, b: _Curve) -> bool:
+def _both_leave(a: ManifoldCurve, b: ManifoldCurve) -> bool:
     """Return True if two curves have left their equilibria."""
     return max(a.left_at, b.left_at) < np.inf
 
