@@ -145,10 +145,7 @@ def pitchfork_at(
 
 
 def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, Floats, Floats]:
-    """Return the distance at which the parameter turns, the point and its slope, by polynomials.
-
-    CorrectorFailed: it does not turn.
-    """
+    """Return the distance at which the parameter turns, the point and its slope, by polynomials."""
     table = chebyshev.chebfit(distances, points, degree)
     slope = chebyshev.chebder(table)
     roots = chebyshev.chebroots(slope[:, -1])
@@ -160,10 +157,7 @@ def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, 
 
 
 def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
-    """Locate the zero of one of the functions between `a` and the point at the distance `step` after it.
-
-    CorrectorFailed, ValueError: the curve cannot be followed there, or the function does not change its sign.
-    """
+    """Locate the zero of one of the functions between `a` and the point at the distance `step` after it."""
 
     def at(sigma: float) -> tuple[float, CurvePoint]:
         place = _beside(curve, a, sigma)

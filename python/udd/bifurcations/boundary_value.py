@@ -37,10 +37,7 @@ class SparseEquations:
         return np.asarray(self.matrix.toarray())
 
     def solve(self, row: Floats, right: Floats) -> Floats:
-        """Return the unknowns for these right sides, of which the last is that of one more `row`.
-
-        LinAlgError: the equations are singular.
-        """
+        """Return the unknowns for these right sides, of which the last is that of one more `row`."""
         whole = sparse.vstack([self.matrix, row[np.newaxis]], format="csc")
         try:
             return np.asarray(linalg_sparse.splu(whole).solve(right))
@@ -112,8 +109,6 @@ class ConnectingCurve:
         """Return the curve through a guess over one parameter, and the unknowns there.
 
         `rests` (1 or 2, r) are the equilibria, `nodes` (m + 1, r) the orbit.
-
-        ModelError: the eigenvalues of the equilibria admit no such orbit at isolated values of one parameter.
         """
         value = float(values[parameter])
         nothing = np.zeros(flow.dim)
@@ -240,10 +235,7 @@ class ConnectingCurve:
         return residual, SparseEquations(sparse.bmat(blocks, format="csr"))
 
     def solved(self, guess: Floats, row: Floats | None = None) -> tuple[ConnectingCurve, Floats]:
-        """Return the curve and its point across `row` near a guess; by default the last parameter is fixed.
-
-        CorrectorFailed: Newton's method does not converge, or to what is no such orbit.
-        """
+        """Return the curve and its point across `row`, by default at the guess of the last parameter."""
         curve = self.anchored(guess)
         across = natural_constraint(guess) if row is None else row
         u = newton_corrector(curve, guess, across, _PATIENCE, _FARTHEST)

@@ -338,10 +338,7 @@ class Branch(Drawable):
 
 
 def cycles_of(branch: Branch) -> list[tuple[PeriodicOrbitCurve, Floats]]:
-    """Return the curves and unknowns of the cycles of a branch over a parameter of an autonomous model.
-
-    ModelError: it is something else.
-    """
+    """Return the curves and unknowns of the cycles of a branch over a parameter of an autonomous model."""
     if not isinstance(branch, Branch) or branch.kind != "cycle":
         raise ModelError("a branch of cycles is needed, of udd.continuation")
     cycles = [(curve, place.u) for curve, place in branch._places if curve.kind == "cycle"]

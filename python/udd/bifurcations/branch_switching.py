@@ -29,8 +29,6 @@ def born_at(point: BifurcationPoint, amplitude: float) -> tuple[AnyCurve, CurveP
 
     The place's tangent leads away. The amplitude is halved until nothing more bifurcates between the point
     and the place.
-
-    ModelError: a point where no branch is born, or where none is found.
     """
     curve, place = point._curve, point._place
     if curve is None or place is None:

@@ -55,8 +55,6 @@ class CyclicEquations:
         Two neighbouring pieces become one by an orthogonal transformation that frees the node between them,
         and so on (S. J. Wright, SIAM J. Sci. Stat. Comput. 13 (1992) 742): stable where orbits are not, in a
         time that is proportional to the number of pieces.
-
-        LinAlgError: the equations are singular.
         """
         m, r, _ = self.pieces.shape
         # Each piece says: begin x[i] + end x[i + 1] + rest (p, q, -1) = 0.

@@ -5,20 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import optimize
 
 from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd.errors import IntegrationError, ModelError
 
+from .bifurcation_location import nearest_bifurcation
 from .boundary_value import ConnectingCurve
-from .branch import Branch, cycles_of
+from .branch import BifurcationPoint, Branch, cycles_of
 from .equilibrium_curve import equilibrium_at
 from .equilibrium_search import refined
 from .error_bounds import COARSE, rounding_of
 from .flow_map import Floats
 from .manifold_search import until_it_stands
 from .pseudo_arclength import CorrectorFailed
-from .saddle_node_cycles import saddle_node_on
 from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium
 
@@ -26,6 +27,10 @@ __all__ = ["Connection", "connection", "found_by"]
 
 _TRIED = 8  # Number of slowest nodes near which an equilibrium is looked for.
 _PROLONGED = 8  # Largest number of prolongations.
+_BESIDE = 1e-2  # Distance from the fold, along the branch of equilibria, where its location starts.
+_NEAR = 0.5  # Largest distance of the fold from the slowest node of the cycle, in typical sizes.
+_GROWN = 1.2  # Growth of the period over the places that are compared.
+_AGREES = 1.3  # Largest factor by which the square of the period times the distance changes.
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,10 +208,7 @@ def prolonged_and_solved(curve: ConnectingCurve, u: Floats) -> tuple[ConnectingC
 
 
 def through_cycle(curve: PeriodicOrbitCurve, u: Floats) -> tuple[ConnectingCurve, Floats]:
-    """Return the curve and the unknowns of a long cycle, cut where it is nearest to an equilibrium.
-
-    ModelError: it comes near no equilibrium.
-    """
+    """Return the curve and the unknowns of a long cycle, cut where it is nearest to an equilibrium."""
     flow, values, nodes, m = curve.flow, curve.values_at(u), curve.nodes(u), curve.pieces
     rests = [refined(flow, values, nodes[i]) for i in np.argsort(curve.speeds(u))[:_TRIED]]
     passages = [
@@ -224,3 +226,40 @@ def through_cycle(curve: PeriodicOrbitCurve, u: Floats) -> tuple[ConnectingCurve
     two = not np.allclose(curve.mirror * rest, rest, atol=1e-9)
     mirror = curve.mirror if two else np.ones(flow.dim)
     return ConnectingCurve.through(flow, values, curve.parameter, rest, mirror, cut, curve.span(u))
+
+
+def saddle_node_on(branch: Branch, curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
+    """Find the fold of equilibria at which the longest cycles of a branch end, or None; `u` is the longest.
+
+    The period grows there with the inverse square root of the distance in the parameter, not with its
+    logarithm, as towards an orbit homoclinic to a saddle.
+    """
+    fold = _fold_near(curve, u)
+    if fold is None:
+        return None
+    near = np.flatnonzero(branch.periods >= branch.periods.max() / _GROWN**3)
+    away, periods = np.abs(branch.values[near] - fold.value), branch.periods[near]
+    if periods.max() < _GROWN * periods.min():
+        return None
+    square = periods**2 * away
+    return fold if square.min() > 0.0 and square.max() < _AGREES * square.min() else None
+
+
+def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
+    """Return the fold of equilibria near the slowest node of a cycle."""
+    flow, slow = curve.flow, curve.nodes(u)[int(np.argmin(curve.speeds(u)))]
+    rests, begin = curve.rests_near(slow, u)
+
+    def equations(y: Floats) -> Floats:
+        residual, matrix = rests.equations(y)
+        return np.append(residual, np.linalg.det(matrix[:, :-1]))
+
+    try:
+        found = optimize.root(equations, begin)
+        guess = found.x
+        if not found.success or np.linalg.norm(rests.state(guess) / flow.size - slow / flow.size) > _NEAR:
+            return None
+        along = np.linalg.svd(rests.equations(guess)[1])[2][-1]
+        return nearest_bifurcation(rests, guess - _BESIDE * along, along, "fold", 2.0 * _BESIDE)
+    except (CorrectorFailed, IntegrationError, ValueError, np.linalg.LinAlgError):
+        return None

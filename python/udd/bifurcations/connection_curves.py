@@ -32,16 +32,7 @@ _ON = 1e-9  # Part of a step within which a point lies on the bound.
 
 @dataclass(frozen=True)
 class ConnectionWay:
-    """Settings for following a curve of connections over two parameters.
-
-    Attributes
-    ----------
-    parameters : (str, str)
-    box : ndarray, shape (2, 2)
-        Bounds of both.
-    step, longest : float
-    most : int
-    """
+    """Settings for following a curve of connections over two parameters, with bounds (2, 2) of both."""
 
     parameters: tuple[str, str]
     box: Floats
@@ -50,10 +41,7 @@ class ConnectionWay:
     most: int
 
     def entered(self, start: Connection) -> Connection:
-        """Return the connection where its curve enters the bounds of the second parameter; `start` if inside.
-
-        ModelError: the curve does not lead to these bounds.
-        """
+        """Return the connection where its curve enters the bounds of the second parameter, or `start`."""
         if start._orbit is None:
             raise ModelError("this connection was not made by udd.connection or udd.connections")
         curve, u = start._orbit

@@ -23,8 +23,7 @@ from .branch_continuation import bounds_of
 from .connecting_orbits import Connection, found_by
 from .equilibrium_search import equilibria
 from .flow_map import Floats, FlowMap, flow_of
-from .invariant_manifolds import FINE
-from .manifold_curves import NARROW, ManifoldCurve, ManifoldFamily
+from .invariant_manifolds import FINE, NARROW, ManifoldCurve, ManifoldFamily
 from .manifold_search import brackets
 from .solutions import FoundList
 

@@ -45,10 +45,7 @@ class Conserved:
 
     @classmethod
     def of(cls, flow: FlowMap, text: str) -> Conserved:
-        """Return the quantity with this formula.
-
-        ModelError: a formula that cannot be used, or a quantity that changes along the motion.
-        """
+        """Return the quantity with this formula."""
         model = flow.model
         states = list(model.state_names)
         try:

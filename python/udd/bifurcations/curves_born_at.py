@@ -24,10 +24,7 @@ _ROUNDS = 40.0  # periods of the Hopf bifurcation, up to which its cycles are fo
 
 
 def fold_of_cycles_at(point: LocusPoint, bounds: Sequence[float]) -> BifurcationPoint:
-    """Return the fold of the cycles near a Bautin point, at a nearby value of the second parameter.
-
-    ModelError: none is found.
-    """
+    """Return the fold of the cycles near a Bautin point, at a nearby value of the second parameter."""
     inner = -point.coefficients["l2"]
     for hopf in _hopf_points(point):
         # The cycles turn on the side where the two coefficients differ in sign.
@@ -40,10 +37,7 @@ def fold_of_cycles_at(point: LocusPoint, bounds: Sequence[float]) -> Bifurcation
 
 
 def homoclinic_at(point: LocusPoint, bounds: Sequence[float]) -> Connection:
-    """Return the homoclinic orbit in which the cycles near a Bogdanov-Takens point end.
-
-    ModelError: none is found.
-    """
+    """Return the homoclinic orbit in which the cycles near a Bogdanov-Takens point end."""
     for hopf in _hopf_points(point):
         cycles = continuation(hopf, hopf.parameter, bounds, max_period=_ROUNDS * hopf.period, max_points=400)
         try:

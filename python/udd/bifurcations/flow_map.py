@@ -177,10 +177,7 @@ class FlowMap:
 
 
 def flow_of(model: Model, states: Floats, forcing: Forcing | None = None) -> FlowMap:
-    """Return the flow of a model near these states (n, dim).
-
-    ModelError: the rates depend on time and no `forcing` is given, or do not repeat after its period.
-    """
+    """Return the flow of a model near these states (n, dim)."""
     require_model(model)
     # A component that happens to be small is no smaller than a tenth of the largest.
     seen = np.maximum(np.abs(states), 0.1 * np.abs(states).max(initial=0.0))

@@ -89,8 +89,6 @@ def secant(height: Callable[[Floats], tuple[float, Floats]], x: Floats, step: fl
     """Find the value ``x[0]`` at which a height vanishes.
 
     `height` returns the height at a value, and the unknowns with the others adjusted to that value.
-
-    ModelError: the values leave the range of 20 steps.
     """
     start, step = float(x[0]), max(step, 1e-8 * abs(x[0]))
     before, a = height(x)

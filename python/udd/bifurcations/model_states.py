@@ -15,10 +15,7 @@ __all__ = ["state_of_attractor"]
 
 
 def state_of_attractor(model: Model, attractor: Any) -> tuple[Model, Floats, float]:
-    """Return the model, a state and the period of a periodic attractor of basins or a diagram.
-
-    ModelError: more than one attractor, another model's, or one that is not periodic.
-    """
+    """Return the model, a state and the period of a periodic attractor of basins or a diagram."""
     names = model.state_names
     prefix = "orbit_" if f"orbit_{names[0]}" in attractor else ""
     if any(f"{prefix}{name}" not in attractor for name in names) or "period_time" not in attractor:

@@ -198,10 +198,7 @@ def tangent_at(curve: Curve, u: Floats, along: Floats) -> Floats:
 def predictor_corrector_step(
     curve: Curve, here: CurvePoint, step: float, longest: float, shortest: float = 1e-8
 ) -> tuple[CurvePoint, float, float]:
-    """Return the next point along the curve, its distance, and the step to be tried next.
-
-    CorrectorFailed: no step longer than `shortest` finds one.
-    """
+    """Return the next point along the curve, its distance, and the step to be tried next."""
     reason = "the curve turns too sharply"
     while step >= shortest:
         try:

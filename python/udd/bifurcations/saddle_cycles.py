@@ -136,10 +136,7 @@ def saddles_of(branch: Branch, growing: bool = True, least: float = 0.0) -> Iter
 
 
 def saddle_at(branch: Branch, value: float, like: SaddleCycle, growing: bool = True) -> SaddleCycle:
-    """Return the saddle cycle of a branch at a value of the parameter that is nearest to another one.
-
-    ModelError: the branch has none there.
-    """
+    """Return the saddle cycle of a branch at a value of the parameter that is nearest to another one."""
     cycles = [orbit for orbit in branch.at(value) if isinstance(orbit, PeriodicOrbit)]
     for orbit in sorted(cycles, key=lambda orbit: float(like.distance(like.flow.reduced(orbit.state)))):
         assert orbit._solved is not None

@@ -125,10 +125,7 @@ class SolutionSurface:
     def zero(
         self, base: SurfacePoint, guess: Floats, normal: Floats, name: str, reach: float
     ) -> SurfacePoint:
-        """Return the zero of a test function on the line through a guess along a direction (2,) of a plane.
-
-        CorrectorFailed: there is none within `reach`.
-        """
+        """Return the zero of a test function near a guess, on the line along a direction (2,) of a plane."""
         points: dict[float, SurfacePoint] = {}
         across = base.ahead(normal)
 
