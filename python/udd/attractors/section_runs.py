@@ -35,6 +35,13 @@ class Crossings:
     end: Floats
     t_end: Floats
 
+    @classmethod
+    def none(cls, n: int, outcome: int, end: Floats) -> Crossings:
+        """Return `n` missing points of each job, which ends at a state (jobs, dim)."""
+        jobs, dim = end.shape
+        points, t = np.full((jobs, n, dim), np.nan), np.full((jobs, n), np.nan)
+        return cls(points, t, np.full(jobs, outcome, dtype=np.uint8), end, np.zeros(jobs))
+
     def only(self, some: NDArray[np.bool_]) -> Crossings:
         """Return the crossings of some jobs."""
         return Crossings(
@@ -75,13 +82,7 @@ class SectionRunner:
         require_memory(
             f"{count} points of each of {jobs} runs", jobs, count, starts.shape[1] + 1, itemsize=16
         )
-        crossings = Crossings(
-            np.full((jobs, count, starts.shape[1]), np.nan),
-            np.full((jobs, count), np.nan),
-            np.full(jobs, START_OUTSIDE, dtype=np.uint8),
-            starts.copy(),
-            np.zeros(jobs),
-        )
+        crossings = Crossings.none(count, START_OUTSIDE, starts.copy())
         runs = np.flatnonzero(~outside)
         if len(runs):
             run_values, first = np.ascontiguousarray(values[runs]), np.ascontiguousarray(starts[runs])

@@ -23,13 +23,7 @@ _GOES_ON = [OUTCOMES.index("finished"), OUTCOMES.index("time ran out"), UNDECIDE
 def nothing(jobs: int, n: int, dim: int) -> Crossings:
     """Before the work: nothing is there, as after Ctrl-C."""
     require_memory(f"{n} points of each of {jobs} jobs", jobs, (n + 1) * (dim + 1), itemsize=8)
-    return Crossings(
-        np.full((jobs, n, dim), np.nan),
-        np.full((jobs, n), np.nan),
-        np.full(jobs, INTERRUPTED, dtype=np.uint8),
-        np.full((jobs, dim), np.nan),
-        np.zeros(jobs),
-    )
+    return Crossings.none(n, INTERRUPTED, np.full((jobs, dim), np.nan))
 
 
 def perturbation(size: Floats, nudge: float) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -15,11 +14,12 @@ from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
 from udd._util.memory import require_memory
 from udd._util.validation import whole
-from udd.errors import IncompleteWarning, IntegrationError, ModelError
+from udd.errors import IntegrationError, ModelError
 
 from .branch import Branch, cycles_of
 from .flow_map import Floats, FlowMap
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
+from .orbit_geometry import section_of
 from .saddle_cycles import SaddleCycle, saddle_at, saddles_of
 from .solutions import PeriodicOrbit
 from .transient_lifetimes import first_stay
@@ -223,22 +223,17 @@ class _Search:
 
     def _crossings(self, saddle: SaddleCycle, starts: Floats, time: float) -> tuple[Floats, Floats]:
         """Return times (n, k) and states (n, k, r) of crossings of the cycle's plane, NaN after the last."""
-        from udd.chaos.poincare_sections import poincare
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", IncompleteWarning)  # they end by the time
-            section = poincare(
-                self.flow.with_values(saddle.values),
-                saddle.plane,
-                int(20.0 * time / saddle.period) + 20,
-                state0=self.flow.full(starts),
-                direction="up",
-                transient=0,
-                t_max=time,
-                rtol=1e-9,
-                atol=1e-12,
-                progress=False,
-            )
+        model, most = self.flow.with_values(saddle.values), int(20.0 * time / saddle.period) + 20
+        section = section_of(
+            model,
+            saddle.plane,
+            most,
+            self.flow.full(starts),
+            direction="up",
+            t_max=time,
+            rtol=1e-9,
+            atol=1e-12,
+        )
         return section.t, self.flow.reduced(section.state)
 
     def _passages(self, saddle: SaddleCycle) -> _Passages:

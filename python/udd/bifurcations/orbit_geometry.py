@@ -9,6 +9,7 @@ import numpy as np
 
 from udd import _core
 from udd.errors import IncompleteWarning, ModelError
+from udd.models import Model
 from udd.simulation.batch import Batch
 from udd.simulation.trajectory import simulate
 
@@ -17,9 +18,11 @@ from .floquet_multipliers import multipliers_at
 from .flow_map import Floats
 
 if TYPE_CHECKING:
+    from udd.chaos.poincare_sections import Section
+
     from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["as_liouville", "crossings_of", "distance_of_nodes", "extremes_of", "orbit_states"]
+__all__ = ["as_liouville", "crossings_of", "distance_of_nodes", "extremes_of", "orbit_states", "section_of"]
 
 _BETWEEN = 12  # states in a piece
 _LIOUVILLE = 1e-2  # between the logarithms of the product of all multipliers and of Liouville's formula
@@ -82,28 +85,25 @@ def _peak(x: Floats) -> float:
 
 def crossings_of(curve: PeriodicOrbitCurve, u: Floats, section: str | None, direction: str | None) -> Floats:
     """Return the states (k, dim) at which a cycle crosses a section."""
-    from udd.chaos.poincare_sections import poincare
-
-    flow = curve.flow
+    flow, model = curve.flow, curve.flow.with_values(curve.values_at(u))
     if flow.forcing is not None:
         raise ModelError("a forced cycle's section is its state at the forcing's phase 0: Branch.states")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IncompleteWarning)  # pieces end before their fourth crossing
-        crossings = poincare(
-            flow.with_values(curve.values_at(u)),
-            section,
-            4,
-            state0=flow.full(curve.around(u)),
-            direction=direction,
-            transient=0,
-            t_max=curve.span(u) / curve.pieces,
-            rtol=1e-10,
-            atol=1e-13,
-            threads=1,
-            progress=False,
-        )
+    starts, time = flow.full(curve.around(u)), curve.span(u) / curve.pieces
+    # Pieces end before their fourth crossing.
+    crossings = section_of(
+        model, section, 4, starts, direction=direction, t_max=time, rtol=1e-10, atol=1e-13, threads=1
+    )
     states: Floats = crossings.state[np.isfinite(crossings.t)]
     return states
+
+
+def section_of(model: Model, section: str | None, n: int, starts: Floats, **options: Any) -> Section:
+    """Return the first crossings of orbits with a surface, without a warning if they are fewer than `n`."""
+    from udd.chaos.poincare_sections import poincare
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IncompleteWarning)
+        return poincare(model, section, n, state0=starts, transient=0, progress=False, **options)
 
 
 def as_liouville(curve: PeriodicOrbitCurve, u: Floats) -> bool:

@@ -112,7 +112,7 @@ class SaddleCycle:
         ahead: Floats = (((x - self.state) / self.flow.size) @ self.rate) / (self.rate @ self.rate)
         return ahead
 
-    def landed(self, x: Floats, loose: float = 1.0) -> Floats:
+    def landed(self, x: Floats, loose: float) -> Floats:
         """Follow states (n, r) to the plane, forward or backward in time."""
         clock = self.flow.clock
         for _ in range(_LANDINGS):
