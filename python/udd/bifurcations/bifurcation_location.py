@@ -11,27 +11,20 @@ from udd.errors import IntegrationError
 
 from .bifurcation_functions import FUNCTIONS, STILL, TestFunctions
 from .branch import AnyCurve, BifurcationPoint
-from .equilibrium_curve import EquilibriumCurve
-from .error_bounds import rounding_of, scatter
+from .error_bounds import rounding_of
 from .flow_map import Floats
 from .pseudo_arclength import (
     CorrectorFailed,
     CurvePoint,
     corrected_point,
-    nearest_of_family,
     newton_corrector,
     predictor_corrector_step,
-    tangent_at,
-    zero_between,
 )
-from .shooting_curve import PeriodicOrbitCurve
 from .solutions import Equilibrium
 
 __all__ = [
     "bifurcations_between",
     "changes",
-    "locate",
-    "location_error",
     "nearest_bifurcation",
     "pitchfork_at",
     "point_at",
@@ -39,11 +32,7 @@ __all__ = [
 
 _NODES = 12  # Points of a curve about a pitchfork.
 _ENOUGH = 8  # Least number of them.
-_SAMPLES = 24  # Equilibria about a bifurcation, in which rounding shows.
-_NEAR = 1e-5  # Their distance, in steps: within it the curve is a parabola.
-_SHORT = 200  # Largest number of pieces of a cycle for which rounding is measured.
 _STEPS = 24  # Steps along a curve, in either direction, until a bifurcation is met.
-_SURE = 2.0  # Ratio of the bound to the largest scatter.
 
 
 def changes(before: TestFunctions, after: TestFunctions) -> list[str]:
@@ -81,7 +70,7 @@ def bifurcations_between(
                 sigma, place = turning(curve, a, step, before, after)
                 passed.append(("end", sigma, place, curve.test_functions(place)))
                 continue
-            sigma, place = locate(curve, a, step, name)
+            sigma, place = curve.refine(a, step, name)
         except (CorrectorFailed, ValueError):
             continue
         here = curve.test_functions(place)
@@ -156,83 +145,6 @@ def _turning_of(distances: Floats, points: Floats, degree: int) -> tuple[float, 
     return x, np.asarray(chebyshev.chebval(x, table)), np.asarray(chebyshev.chebval(x, slope))
 
 
-def locate(curve: AnyCurve, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
-    """Locate the zero of one of the functions between `a` and the point at the distance `step` after it."""
-
-    def at(sigma: float) -> tuple[float, CurvePoint]:
-        place = _beside(curve, a, sigma)
-        return float(getattr(curve.test_functions(place), name)), place
-
-    return zero_between(at, step)
-
-
-def _beside(curve: AnyCurve, a: CurvePoint, distance: float) -> CurvePoint:
-    """Return the point of the curve at a distance from `a`.
-
-    Next to a branch point the equations leave a second direction free, in which rounding alone would move
-    Newton's method: there it takes the shortest steps.
-    """
-    guess = a.u + distance * a.tangent
-    try:
-        u = newton_corrector(curve, guess, a.tangent)
-    except CorrectorFailed:
-        u = nearest_of_family(curve, guess, a.tangent)
-    return CurvePoint(u, tangent_at(curve, u, a.tangent))
-
-
-def location_error(
-    curve: AnyCurve, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
-) -> tuple[float, float]:
-    """Return bounds of the errors of the value and of the period at a zero of the test function `name`.
-
-    The bound of a cycle is how far both move when runs are less accurate. The bound of an equilibrium comes
-    from the rounding of the test function, measured near its zero; the period is that of the cycles born
-    there.
-    """
-    if curve.kind == "equilibrium":
-        return _scatter(curve, a, sigma, place, step, name)
-
-    def at(distance: float, own: PeriodicOrbitCurve = curve) -> tuple[float, Floats]:
-        there = _beside(own, a, distance)
-        pair = np.array([own.value(there.u), own.period(there.u)])
-        return float(getattr(own.test_functions(there), name)), pair
-
-    located = np.array([curve.value(place.u), curve.period(place.u)])
-    aside = 1e-3 * step
-    (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
-    moved, there = at(sigma, curve.coarse())
-    here, _ = at(sigma)
-    shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
-    value, period = rounding_of(located) + np.abs(there - located) + np.abs(shift)
-    if curve.pieces <= _SHORT:
-        # Rounding is that of the largest numbers in the equations, which the value itself may not be.
-        near = np.array([-1.0, -0.5, 0.5, 1.0])
-        noise, fitted = scatter(near, np.array([at(sigma + _NEAR * step * x)[1] for x in near]), 2)
-        noise = noise + np.abs(fitted[2] - located)
-        value, period = value + _SURE * noise[0], period + _SURE * noise[1]
-    return float(value), float(period)
-
-
-def _scatter(
-    curve: EquilibriumCurve, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
-) -> tuple[float, float]:
-    """Bounds of the errors of the value and of the period: from how those near by scatter about a curve."""
-    distances = np.linspace(-1.0, 1.0, _SAMPLES)
-    seen = []
-    for distance in sigma + _NEAR * step * distances:
-        there = corrected_point(curve, a.u + distance * a.tangent, a.tangent)
-        signs = curve.test_functions(there)
-        turning = abs(signs.pair.imag)
-        period = 2.0 * np.pi / turning if name == "complex_pair" and turning else np.nan
-        seen.append((float(getattr(signs, name)), curve.value(there.u), period))
-    noise, fitted = scatter(distances, np.array(seen), 2)
-    slope = np.abs(fitted[1])
-    # So far along the branch the zero may be off.
-    off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
-    value, period = _SURE * (noise[1:] + off * slope[1:])
-    return float(value + rounding_of(curve.value(place.u))), float(period + rounding_of(seen[0][2]))
-
-
 def point_at(
     curve: AnyCurve,
     kind: str,
@@ -271,7 +183,7 @@ def nearest_bifurcation(
                 found = next((entry for entry in passed if entry[0] == kind), None)
                 if found is not None:
                     _, sigma, place, at = found
-                    errors = location_error(curve, here, sigma, place, gone, FUNCTIONS[kind])
+                    errors = curve.location_error(here, sigma, place, gone, FUNCTIONS[kind])
                     points.append(point_at(curve, kind, place, at, errors=errors))
                     break
                 here, signs = there, after

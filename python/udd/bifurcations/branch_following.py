@@ -13,7 +13,7 @@ import numpy as np
 from udd.errors import IntegrationError
 
 from .bifurcation_functions import FUNCTIONS, TestFunctions
-from .bifurcation_location import bifurcations_between, location_error, pitchfork_at, point_at
+from .bifurcation_location import bifurcations_between, pitchfork_at, point_at
 from .branch import AnyCurve, BifurcationPoint
 from .branch_ends import hopf_end, origin_of
 from .error_bounds import rounding_of
@@ -143,7 +143,7 @@ class _Way(BranchTrace):
             else:
                 errors = float("nan"), float("nan")
                 with suppress(CorrectorFailed, IntegrationError):
-                    errors = location_error(curve, place, sigma, there, gone, FUNCTIONS[kind])
+                    errors = curve.location_error(place, sigma, there, gone, FUNCTIONS[kind])
                 self.note(Station(curve, there, signs, here.arclength + sigma), kind, errors)
             if self.end:
                 return

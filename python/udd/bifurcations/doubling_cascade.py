@@ -14,7 +14,7 @@ from udd._util.validation import whole
 from udd.errors import IntegrationError, ModelError
 
 from .bifurcation_functions import TestFunctions
-from .bifurcation_location import location_error, point_at
+from .bifurcation_location import point_at
 from .branch import BifurcationPoint, Branch
 from .branch_continuation import bounds_of, branch_from, continuation
 from .branch_following import BranchTrace, Station
@@ -254,8 +254,8 @@ def _doubling_ahead(point: BifurcationPoint, ahead: float, amplitude: float) -> 
         raise CorrectorFailed("the secant method does not converge")
     place, signs = orbits[square]
     size = square**0.5
-    errors = location_error(
-        new, CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
+    errors = new.location_error(
+        CurvePoint(place.u - size * place.tangent, place.tangent), size, place, size, "period_doubling"
     )
     own = point_at(new, _KIND, place, signs, size, errors)
     # Orbits beyond the doubling, from the secant method, are left out.

@@ -11,11 +11,11 @@ import numpy as np
 from udd import _core
 
 from .bifurcation_functions import STILL, TURNING, TestFunctions
-from .error_bounds import rounding_of, scatter
+from .error_bounds import SURE, rounding_of, scatter
 from .flow_map import Floats, FlowMap
 from .nonsmooth import next_corner
 from .normal_forms import Derivatives, first_lyapunov_coefficient
-from .pseudo_arclength import CurvePoint, newton_corrector
+from .pseudo_arclength import CurvePoint, corrected_point, newton_corrector
 from .solution_curve import SolutionCurve
 from .solutions import Equilibrium, kind_of_rest
 
@@ -149,6 +149,28 @@ class EquilibriumCurve(SolutionCurve):
         complex_pair = float(np.prod(pairs).real) if pairs else float("nan")
         determinant = float(np.linalg.det(here.by_state * self.flow.clock))
         return TestFunctions(values, float(place.tangent[-1]), determinant, complex_pair=complex_pair)
+
+    def location_error(
+        self, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
+    ) -> tuple[float, float]:
+        """Return bounds of the errors of the value and of the period of the cycles born at a zero.
+
+        They come from how those near by scatter about a curve: from the rounding of the test function.
+        """
+        distances = np.linspace(-1.0, 1.0, 2 * _SAMPLES)
+        seen = []
+        for distance in sigma + _NEAR * step * distances:
+            there = corrected_point(self, a.u + distance * a.tangent, a.tangent)
+            signs = self.test_functions(there)
+            turning = abs(signs.pair.imag)
+            period = 2.0 * np.pi / turning if name == "complex_pair" and turning else np.nan
+            seen.append((float(getattr(signs, name)), self.value(there.u), period))
+        noise, fitted = scatter(distances, np.array(seen), 2)
+        slope = np.abs(fitted[1])
+        # So far along the branch the zero may be off.
+        off = noise[0] / slope[0] if slope[0] > noise[0] else 0.0
+        value, period = SURE * (noise[1:] + off * slope[1:])
+        return float(value + rounding_of(self.value(place.u))), float(period + rounding_of(seen[0][2]))
 
     def kind_at(self, name: str, here: TestFunctions) -> str:
         """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""

@@ -8,9 +8,10 @@ import numpy as np
 
 from .flow_map import Floats
 
-__all__ = ["COARSE", "rounding_of", "scatter"]
+__all__ = ["COARSE", "SURE", "rounding_of", "scatter"]
 
 COARSE = 100.0  # factor by which the runs that measure the error are less accurate
+SURE = 2.0  # Ratio of a bound to the largest scatter.
 
 
 def rounding_of(value: Any) -> Any:

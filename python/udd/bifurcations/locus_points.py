@@ -11,7 +11,7 @@ from udd.errors import IntegrationError
 
 from .connecting_orbits import Connection
 from .equilibrium_curve import EquilibriumCurve, expansion
-from .error_bounds import rounding_of, scatter
+from .error_bounds import SURE, rounding_of, scatter
 from .flow_map import Floats
 from .normal_forms import (
     Derivatives,
@@ -40,7 +40,6 @@ _NEAR = 1e-4  # Radians in a typical time, or from 1: a pair this near to the ax
 _ZERO = 1e-3  # Size of a function at its zero, relative to its values before and after.
 _SAMPLES = 8  # Points about a special one, in which rounding shows.
 _ASIDE = 1e-3  # Their distance, in lengths of the segment.
-_SURE = 2.0  # Ratio of the bound to the largest scatter.
 
 #: Functions whose zeros are special points, by the kind of the curve.
 _WATCHED = {
@@ -315,5 +314,5 @@ def _scatter(kind: str, segment: Segment, part: float, function: Callable[[Surfa
         gap, noise = gap + moved[0], noise + moved
     off = gap / slope[0] if slope[0] > gap else np.nan
     # The slope counts in samples' distances, and so does this distance from the zero.
-    bounds: Floats = _SURE * (noise[1:] + off * slope[1:])
+    bounds: Floats = SURE * (noise[1:] + off * slope[1:])
     return bounds

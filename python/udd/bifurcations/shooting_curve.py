@@ -12,7 +12,7 @@ from udd.errors import IntegrationError
 
 from .bifurcation_functions import STILL, TURNING, TestFunctions, product_less
 from .equilibrium_curve import EquilibriumCurve
-from .error_bounds import COARSE, rounding_of
+from .error_bounds import COARSE, SURE, rounding_of, scatter
 from .floquet_multipliers import Multipliers, multipliers_at
 from .flow_map import Floats
 from .orbit_geometry import as_liouville, crossings_of, distance_of_nodes, extremes_of
@@ -23,6 +23,8 @@ from .solutions import PeriodicOrbit
 __all__ = ["PeriodicOrbitCurve"]
 
 _COLLAPSED = 0.02  # Size relative to that before, below which an orbit is an equilibrium.
+_SHORT = 200  # Largest number of pieces of a cycle for which rounding is measured.
+_NEAR = 1e-5  # Distance of cycles in which it shows, in steps: within it the curve is a parabola.
 _EXACT = 1e-11  # a singular value below this part of the largest is zero but for rounding
 
 
@@ -174,6 +176,31 @@ class PeriodicOrbitCurve(ShootingEquations):
         complex_pair = product_less(logs, phases, 1.0) if pairs else float("nan")
         plus, minus = (product_less(multipliers.log, multipliers.phases, unit) for unit in (1.0, -1.0))
         return TestFunctions(multipliers.values, float(place.tangent[-1]), plus, minus, complex_pair)
+
+    def location_error(
+        self, a: CurvePoint, sigma: float, place: CurvePoint, step: float, name: str
+    ) -> tuple[float, float]:
+        """Return bounds of the errors of value and period at a zero: how far less accurate runs move both."""
+
+        def at(distance: float, curve: PeriodicOrbitCurve = self) -> tuple[float, Floats]:
+            there = curve.beside(a, distance)
+            pair = np.array([curve.value(there.u), curve.period(there.u)])
+            return float(getattr(curve.test_functions(there), name)), pair
+
+        located = np.array([self.value(place.u), self.period(place.u)])
+        aside = 1e-3 * step
+        (low, first), (high, last) = at(sigma - aside), at(sigma + aside)
+        moved, there = at(sigma, self.coarse())
+        here, _ = at(sigma)
+        shift = (moved - here) * (last - first) / (high - low) if high != low else np.zeros(2)
+        value, period = rounding_of(located) + np.abs(there - located) + np.abs(shift)
+        if self.pieces <= _SHORT:
+            # Rounding is that of the largest numbers in the equations, which the value itself may not be.
+            near = np.array([-1.0, -0.5, 0.5, 1.0])
+            noise, fitted = scatter(near, np.array([at(sigma + _NEAR * step * x)[1] for x in near]), 2)
+            noise = noise + np.abs(fitted[2] - located)
+            value, period = value + SURE * noise[0], period + SURE * noise[1]
+        return float(value), float(period)
 
     def kind_at(self, name: str, here: TestFunctions) -> str:
         """Return the kind of bifurcation at a zero of the function `name`; "" if nothing bifurcates."""

@@ -9,9 +9,17 @@ import numpy as np
 
 from udd.errors import ModelError
 
+from .bifurcation_functions import TestFunctions
 from .flow_map import Floats, FlowMap
 from .normal_forms import Derivatives
-from .pseudo_arclength import CurvePoint
+from .pseudo_arclength import (
+    CorrectorFailed,
+    CurvePoint,
+    nearest_of_family,
+    newton_corrector,
+    tangent_at,
+    zero_between,
+)
 
 __all__ = ["HELD", "SolutionCurve"]
 
@@ -77,6 +85,36 @@ class SolutionCurve:
         factor = np.append(np.ones(len(place.u) - 1), self.scale / scale)
         along = place.tangent * factor
         return replace(self, scale=scale), CurvePoint(place.u * factor, along / np.linalg.norm(along))
+
+    def equations(self, u: Floats) -> tuple[Floats, Any]:
+        """Return the residuals of the equations and their derivatives."""
+        raise NotImplementedError
+
+    def test_functions(self, place: CurvePoint) -> TestFunctions:
+        """Return the test functions at a point."""
+        raise NotImplementedError
+
+    def beside(self, a: CurvePoint, distance: float) -> CurvePoint:
+        """Return the point of the curve at a distance from `a`.
+
+        Next to a branch point the equations leave a second direction free, in which rounding alone would move
+        Newton's method: there it takes the shortest steps.
+        """
+        guess = a.u + distance * a.tangent
+        try:
+            u = newton_corrector(self, guess, a.tangent)
+        except CorrectorFailed:
+            u = nearest_of_family(self, guess, a.tangent)
+        return CurvePoint(u, tangent_at(self, u, a.tangent))
+
+    def refine(self, a: CurvePoint, step: float, name: str) -> tuple[float, CurvePoint]:
+        """Return the zero of a test function between `a` and the point at the distance `step` after it."""
+
+        def at(sigma: float) -> tuple[float, CurvePoint]:
+            place = self.beside(a, sigma)
+            return float(getattr(self.test_functions(place), name)), place
+
+        return zero_between(at, step)
 
     def coarse(self) -> Self:
         """Return the curve with less accurate runs; that of equilibria has none."""
