@@ -36,13 +36,9 @@ _STEPS = 24  # Steps along a curve, in either direction, until a bifurcation is 
 
 
 def changes(before: TestFunctions, after: TestFunctions) -> list[str]:
-    """Return a mask of the functions that change their signs."""
-    names = []
-    for name in ("fold", "unit_multiplier", "period_doubling", "complex_pair", "collision"):
-        a, b = getattr(before, name), getattr(after, name)
-        if a * b < 0.0:
-            names.append(name)
-    return names
+    """Return the names of the functions that change their signs."""
+    names = ("fold", "unit_multiplier", "period_doubling", "complex_pair", "collision")
+    return [name for name in names if getattr(before, name) * getattr(after, name) < 0.0]
 
 
 def bifurcations_between(
@@ -53,20 +49,18 @@ def bifurcations_between(
     `a` is followed by a point at the distance `step`, where the functions are `after`.
     """
     changed = changes(before, after)
+    turns = "fold" in changed and "unit_multiplier" not in changed
+    still = max(abs(before.fold), abs(after.fold)) < STILL
+    # Towards a connection the parameter stands still, but for rounding.
+    undecided = np.isnan([before.unit_multiplier, after.unit_multiplier]).any()
     passed = []
     for name in changed:
         if name == "unit_multiplier" and "fold" in changed:
             continue
-        if name == "fold" and np.isnan([before.unit_multiplier, after.unit_multiplier]).any():
-            continue  # not decided: towards a connection the parameter stands still, but for rounding
-        if (
-            name == "fold"
-            and "unit_multiplier" not in changed
-            and max(abs(before.fold), abs(after.fold)) < STILL
-        ):
+        if name == "fold" and (undecided or (turns and still)):
             continue
         try:
-            if name == "fold" and "unit_multiplier" not in changed:
+            if name == "fold" and turns:
                 sigma, place = turning(curve, a, step, before, after)
                 passed.append(("end", sigma, place, curve.test_functions(place)))
                 continue
