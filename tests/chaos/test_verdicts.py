@@ -55,11 +55,19 @@ def test_verdicts(model: udd.Model, start: list[float], verdict: str, dimension:
         (["-x^2"], [1.0]),
         (["v", "-v - x^3"], [10.0, 0.0]),
         (["x*v", "-v - x^2"], [1.0, 1.0]),
+        (["-x^3", "-v^3", "-z"], [1.0, 2.0, 3.0]),
     ],
 )
 @pytest.mark.filterwarnings("ignore::udd.errors.ConvergenceWarning")  # exponents that end at 0
 def test_a_slow_decay_is_no_escape(rates: list[str], start: list[float]) -> None:
-    assert udd.lyapunov_spectrum(udd.Model(XV[: len(rates)], rates), state0=start).verdict == "equilibrium"
+    model = udd.Model([*XV, "z"][: len(rates)], rates)
+    assert udd.lyapunov_spectrum(model, state0=start).verdict == "equilibrium"
+
+
+@pytest.mark.filterwarnings("ignore::udd.errors.ConvergenceWarning")
+def test_a_slow_spiral_is_no_escape() -> None:
+    model = udd.Model(XV, ["-x^3 + v^3", "-v^3 - x^3"])
+    assert udd.lyapunov_spectrum(model, state0=[1.0, 2.0]).verdict != "escapes"
 
 
 # The same laws with other signs, and speeds that fall with the time.

@@ -343,8 +343,11 @@ def cycles_of(branch: Branch) -> list[tuple[PeriodicOrbitCurve, Floats]]:
         raise ModelError("a branch of cycles is needed, of udd.continuation")
     cycles = [(curve, place.u) for curve, place in branch._places if curve.kind == "cycle"]
     curve = cycles[0][0]
-    if curve.parameter == HELD or curve.flow.forcing is not None:
+    if curve.parameter == HELD:
         raise ModelError(
-            f"the branch is over {branch.parameter}; needed is a parameter of a model that is not forced"
+            "a branch over a parameter of a model is needed: follow the cycles over a parameter of the "
+            f"model, not over {branch.parameter}"
         )
+    if curve.flow.forcing is not None:
+        raise ModelError("the branch must be followed over a parameter of a model that is not forced")
     return cycles

@@ -17,7 +17,7 @@ from udd.models.state_scaling import Coordinates, coordinates_of, depends_on_tim
 from udd.simulation.sampling import states_along
 
 from .recurrence import SETTLING, Tightness, periods, tightness
-from .rest import RestTest
+from .rest import RestTest, equilibrium_near
 
 if TYPE_CHECKING:
     from .poincare_sections import Section
@@ -205,4 +205,13 @@ class Orbit:
                 if (size > _FAR * np.maximum(first, np.abs(state[plain]))).any():
                     return True
             first, last, span = size if first is None else first, size, 2.0 * span
-        return True
+        return run is not None and not self._may_stay(state, run[-1])
+
+    def _may_stay(self, state: _Floats, end: _Floats) -> bool:
+        """Return True if the orbit is about an equilibrium, and nearer to it in some component at the end."""
+        rest = equilibrium_near(self.model, state, self.kept, 0.0)
+        if rest is None or rest.repels:
+            return False
+        before, after = (np.abs(x[self.kept] - rest.state) for x in (state, end))
+        noise = _NOISE * (self.atol + self.rtol * np.abs(state[self.kept]))
+        return bool((after < before - noise).any() and (after < 2.0 * before + noise).all())

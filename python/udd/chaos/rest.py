@@ -148,15 +148,18 @@ class RestTest:
         return end if stays and (late <= _LEFT * first + noise).all() else None
 
     def _creeps(self, state: _Floats, rest: Equilibrium, noise: _Floats) -> bool:
-        """Return True if the orbit comes along the only slow direction, in which the rates lead to the end.
+        """Return True if an orbit comes along slow directions, in each of which the rates lead to the end.
 
         Such a decay may be slower than any exponential, as that of x' = -x^3, and last for any time.
         """
         numbers, right = np.linalg.eig(rest.slopes)
-        slow = int(np.argmin(np.abs(numbers)))
-        decay = -np.delete(numbers, slow).real
         least = _ZERO * np.abs(numbers).max()
-        if rest.repels or numbers[slow].imag != 0.0 or (decay <= least).any():
+        begin, speed = np.abs(state[self.kept] - rest.state), np.abs(self.model.rates(0.0, state)[self.kept])
+        # No eigenvalue that is smaller than this says how the distance changes.
+        present = (speed[begin > noise] / begin[begin > noise]).max(initial=0.0)
+        slow = np.abs(numbers) <= max(least, present, float(np.abs(numbers).min()))
+        decay = -numbers[~slow].real
+        if rest.repels or (numbers[slow].imag != 0.0).any() or (decay <= least).any():
             return False
         # The fast directions decay meanwhile.
         span = min(_SPANS / float(decay.min()) if len(decay) else self.clock, self.longest)
@@ -167,8 +170,10 @@ class RestTest:
         if (np.abs(away[1:]) > np.abs(away[:-1]) + noise).any():
             return False
         along = np.linalg.pinv(right)[slow].real
+        sides = along @ away[-1]
+        moving = np.abs(sides) > np.abs(along) @ noise
         places = np.repeat(states[-1:], len(_PARTS), axis=0)
         places[:, self.kept] = rest.state + _PARTS[:, None] * away[-1]
         times = _TIMES if self.model.names_time else _TIMES[:1]
         rates = [self.model.rates(np.full(len(places), t * self.clock), places)[:, self.kept] for t in times]
-        return bool((np.array(rates) @ along * (away[-1] @ along) < 0.0).all())
+        return bool(moving.any() and ((np.array(rates) @ along.T * sides)[..., moving] < 0.0).all())
