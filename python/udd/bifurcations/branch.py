@@ -23,7 +23,7 @@ from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, guess_at, natural_constraint, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
 from .solution_curve import HELD
-from .solutions import Equilibrium, PeriodicOrbit
+from .solutions import Equilibrium, PeriodicOrbit, as_plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -300,28 +300,15 @@ class Branch(Drawable):
         dict of str
             Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
         """
-        return {
-            "parameter": self.parameter,
-            "kind": self.kind,
-            "symmetric": self.symmetric,
-            "values": self.values.tolist(),
-            "states": self.states.tolist(),
-            "periods": self.periods.tolist(),
-            "stable": self.stable.tolist(),
-            "low": self.extremes[0].tolist(),
-            "high": self.extremes[1].tolist(),
+        low, high = self.extremes
+        lists = ("values", "states", "periods", "stable")
+        return as_plain(self, "parameter", "kind", "symmetric", *lists) | {
+            "low": low.tolist(),
+            "high": high.tolist(),
             "points": [
-                {
-                    "kind": point.kind,
-                    "value": point.value,
-                    "error": point.error,
-                    "period": point.period,
-                    "period_error": point.period_error,
-                    "state": point.solution.state.tolist(),
-                    "frequency": point.frequency,
-                    "lyapunov_coefficient": point.lyapunov_coefficient,
-                    "criticality": point.criticality,
-                }
+                as_plain(point, "kind", "value", "error", "period", "period_error")
+                | {"state": point.solution.state.tolist()}
+                | as_plain(point, "frequency", "lyapunov_coefficient", "criticality")
                 for point in self.points
             ],
             "ends": list(self.ends),

@@ -154,7 +154,7 @@ def continuation(
         )
     limit = max(40.0 * curve.flow.clock, 8.0 * curve.span(place.u))
     limit = limit if max_period is None else number("max_period", max_period, above=0.0)
-    wanted = _wanted(until)
+    wanted = until if callable(until) else lambda point: bool(point.kind == until)
     limits = ContinuationLimits(low, high, ds, ds_max, whole("max_points", max_points, 1), limit, wanted)
     if isinstance(start, BifurcationPoint):
         return branch_from([follow_branch(curve, place, limits)], model, parameter, f"born at a {start.kind}")
@@ -189,14 +189,6 @@ def in_unit_of(point: BifurcationPoint, low: float, high: float) -> BifurcationP
         return point
     curve, place = curve.in_unit(place, unit_of(point.value, low, high))
     return replace(point, _curve=curve, _place=place)
-
-
-def _wanted(until: str | Callable[[BifurcationPoint], bool] | None) -> Callable[[BifurcationPoint], bool]:
-    if until is None:
-        return lambda point: False
-    if isinstance(until, str):
-        return lambda point: point.kind == until
-    return until
 
 
 def _at(

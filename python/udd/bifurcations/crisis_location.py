@@ -21,7 +21,7 @@ from .flow_map import Floats, FlowMap
 from .manifold_search import Accuracy, brackets, converge, distinct, secant
 from .orbit_geometry import section_of
 from .saddle_cycles import SaddleCycle, saddle_at, saddles_of
-from .solutions import PeriodicOrbit
+from .solutions import PeriodicOrbit, as_plain
 from .transient_lifetimes import first_stay
 
 __all__ = ["Crisis", "crises"]
@@ -92,13 +92,7 @@ class Crisis(Drawable):
         dict of str
             Numbers, texts, lists and dictionaries; :func:`json.dumps` takes it.
         """
-        return {
-            "kind": self.kind,
-            "parameter": self.parameter,
-            "value": self.value,
-            "error": self.error,
-            "side": self.side,
-            "returns": self.returns,
+        return as_plain(self, "kind", "parameter", "value", "error", "side", "returns") | {
             "period": self.cycle.period,
             "state": self.cycle.state.tolist(),
         }

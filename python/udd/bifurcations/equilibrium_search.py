@@ -116,7 +116,7 @@ def equilibria(model: Model, *, near: ArrayLike | None = None, initial_states: i
     require_memory(f"{count} initial states", count, 200 + 32 * dim, itemsize=1)
     flow = flow_of(model, given if len(given) else np.ones((1, dim)))
     collected = _Found(flow)
-    search = _all_of_polynomials(flow, collected) or _some(flow, flow.reduced(given), count, collected)
+    search = _all_of_polynomials(flow, collected) or _search(flow, flow.reduced(given), count, collected)
     for x in flow.reduced(given):
         if refined(flow, flow.values, x) is None:
             collected.add_degenerate(x, nearest=False)
@@ -228,17 +228,8 @@ def _defined(below: Polynomials, x: Floats) -> bool:
     return bool((np.abs(below.values(x)) > _REST * below.sizes(x)).all())
 
 
-def _some(flow: FlowMap, given: Floats, count: int, found: _Found) -> str:
-    """Find equilibria from many states; say how."""
-    _search(flow, given, count, found)
-    names = [flow.model.state_names[k] for k in flow.kept]
-    within = (f"|{n}| <= {_REACHES[-1] * s:.4g}" for n, s in zip(names, flow.size, strict=True))
-    given_too = f" and {len(given)} given" if len(given) else ""
-    return f"Powell's method from {count} states within {', '.join(within)}{given_too}: others may exist"
-
-
-def _search(flow: FlowMap, given: Floats, count: int, collected: _Found) -> None:
-    """Find equilibria from given states (n, r) and from rounds of `count` states each.
+def _search(flow: FlowMap, given: Floats, count: int, collected: _Found) -> str:
+    """Find equilibria from given states (n, r) and from rounds of `count` states each; say how.
 
     A round is followed by another in the box of what was found, as long as it finds something new within
     the boxes of the first.
@@ -275,6 +266,10 @@ def _search(flow: FlowMap, given: Floats, count: int, collected: _Found) -> None
             break
     for x in singular[:_MOST_SINGULAR]:
         collected.add_degenerate(x)
+    names = [flow.model.state_names[k] for k in flow.kept]
+    within = (f"|{n}| <= {_REACHES[-1] * s:.4g}" for n, s in zip(names, flow.size, strict=True))
+    given_too = f" and {len(given)} given" if len(given) else ""
+    return f"Powell's method from {count} states within {', '.join(within)}{given_too}: others may exist"
 
 
 def _within(flow: FlowMap, x: Floats) -> bool:

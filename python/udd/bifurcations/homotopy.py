@@ -38,15 +38,12 @@ class Roots:
     multiple : ndarray of complex, shape (l, n)
         Ends of paths near which the derivatives are singular, paths to one root together: multiple roots,
         and points on sets of roots.
-    paths : int
-        The number of paths.
     lost : int
-        Paths that could not be followed to the end.
+        Paths that could not be followed to the end, or that jumped to another.
     """
 
     simple: Complex
     multiple: Complex
-    paths: int
     lost: int
 
 
@@ -64,18 +61,15 @@ def complex_roots(system: Polynomials) -> Roots:
     the end of a path. If two paths end at one simple root, one of them has jumped: all are followed again,
     more closely.
     """
-    best: Roots | None = None
-    for attempt, tolerance in enumerate(_TOLERANCE):
-        made, jumped = _attempt(system, tolerance, seed=attempt)
-        if best is None or made.lost + jumped < best.lost:
-            best = Roots(made.simple, made.multiple, made.paths, made.lost + jumped)
+    best = _attempt(system, _TOLERANCE[0], seed=0)
+    for attempt, tolerance in enumerate(_TOLERANCE[1:], 1):
         if best.lost == 0:
             break
-    assert best is not None
+        best = min(best, _attempt(system, tolerance, seed=attempt), key=lambda roots: roots.lost)
     return best
 
 
-def _attempt(system: Polynomials, tolerance: float, seed: int) -> tuple[Roots, int]:
+def _attempt(system: Polynomials, tolerance: float, seed: int) -> Roots:
     random = np.random.default_rng(50 + seed)
     path = _Paths(system, random)
     x, earlier, arrived = path.follow(tolerance)
@@ -101,10 +95,8 @@ def _attempt(system: Polynomials, tolerance: float, seed: int) -> tuple[Roots, i
         else:
             simple.append(root)
     merged = _clusters(others)
-    roots = Roots(
-        np.array(simple).reshape(-1, n), np.array(merged).reshape(-1, n), len(x), int((~arrived).sum())
-    )
-    return roots, jumped
+    lost = int((~arrived).sum()) + jumped
+    return Roots(np.array(simple).reshape(-1, n), np.array(merged).reshape(-1, n), lost)
 
 
 def _clusters(ends: list[tuple[Complex, float]]) -> list[Complex]:

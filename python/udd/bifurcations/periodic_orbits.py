@@ -278,16 +278,11 @@ def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve,
             continue  # it has hardly left its start, where it is slow
         nodes = flown(flow, values, start, share, flow.pieces_for(share))
         try:
-            found = closed(replace_values(flow, values), nodes[:-1], share, mirror, shift)
+            found = closed(replace(flow, model=model), nodes[:-1], share, mirror, shift)
         except ModelError:
             continue
         return _simplest(*found)
     return curve, u
-
-
-def replace_values(flow: FlowMap, values: Floats) -> FlowMap:
-    """Return the flow whose model has these values."""
-    return replace(flow, model=flow.with_values(values))
 
 
 def flown(flow: FlowMap, values: Floats, start: Floats, span: float, pieces: int) -> Floats:

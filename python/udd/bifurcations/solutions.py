@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from .shooting_curve import PeriodicOrbitCurve
 
-__all__ = ["Equilibrium", "PeriodicOrbit", "kind_of_rest"]
+__all__ = ["Equilibrium", "PeriodicOrbit", "as_plain", "kind_of_rest"]
 
 Complex = NDArray[np.complex128]
 Found = TypeVar("Found")
@@ -45,6 +45,12 @@ class FoundList(list[Found]):
 
     def __repr__(self) -> str:
         return f"<{super().__repr__()}; {self.search}>"
+
+
+def as_plain(thing: object, *names: str) -> dict[str, Any]:
+    """Return attributes as plain numbers, texts and lists."""
+    values = {name: getattr(thing, name) for name in names}
+    return {n: value.tolist() if isinstance(value, np.ndarray) else value for n, value in values.items()}
 
 
 def kind_of_rest(eigenvalues: Complex) -> str:
