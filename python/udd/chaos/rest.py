@@ -27,6 +27,7 @@ _SPANS = 10.0  # Times of the slowest decay for which an orbit is followed.
 _LEAVES = 40.0  # The same of the slowest growth: rounding is large then, if no symmetry forbids it.
 _LEFT = 0.1  # Share of the largest distance that may remain then.
 _SAMPLES = 200
+_FAINT = 1e-3  # Part of the speed of an approach: smaller eigenvalues are zero for it.
 _PARTS = np.geomspace(0.1, 1.0, 30)  # Shares of the distance at which the rate must have one sign.
 _TIMES = (0.0, 0.7371)  # in typical times: an equilibrium of rates that depend on time is there at both
 
@@ -153,11 +154,11 @@ class RestTest:
         Such a decay may be slower than any exponential, as that of x' = -x^3, and last for any time.
         """
         numbers, right = np.linalg.eig(rest.slopes)
-        least = _ZERO * np.abs(numbers).max()
+        least = _ZERO * np.abs(numbers).max(initial=0.0)
         begin, speed = np.abs(state[self.kept] - rest.state), np.abs(self.model.rates(0.0, state)[self.kept])
-        # No eigenvalue that is smaller than this says how the distance changes.
-        present = (speed[begin > noise] / begin[begin > noise]).max(initial=0.0)
-        slow = np.abs(numbers) <= max(least, present, float(np.abs(numbers).min()))
+        # Eigenvalues far below the present speed do not say how the distance changes.
+        present = _FAINT * (speed[begin > noise] / begin[begin > noise]).max(initial=0.0)
+        slow = np.abs(numbers) <= max(least, present, float(np.abs(numbers).min(initial=np.inf)))
         decay = -numbers[~slow].real
         if rest.repels or (numbers[slow].imag != 0.0).any() or (decay <= least).any():
             return False
