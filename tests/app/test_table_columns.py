@@ -50,6 +50,14 @@ def test_a_disk_is_guessed(tmp_path: Path) -> None:
     assert [column["guess"] for column in found["columns"]] == ["t", "Y", "Z", "beta"]
 
 
+def test_a_camera_s_axes_with_an_orientation_are_a_disk(tmp_path: Path) -> None:
+    found = look(table(tmp_path, "tijd (s);x (cm);y (cm);draaihoek (graden)", T, SWING, SWING, SWING))
+    assert [column["guess"] for column in found["columns"]] == ["t", "Y", "Z", "beta"]
+    assert [column["unit"] for column in found["columns"]] == ["s", "cm", "cm", "graden"]
+    assert found["kind"] == ""  # the page then takes the columns as guessed
+    assert look(table(tmp_path, "t;x;y", T, SWING, SWING))["kind"] == "pendulum"
+
+
 def test_a_choice_with_units_is_read(tmp_path: Path) -> None:
     path = table(tmp_path, "a;b;c", 1000 * T, SWING, T)
     m = measurement_of(path, [["t", "a", "ms"], ["theta", "b", "deg"]], {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +36,12 @@ def look(path: Path) -> dict[str, Any]:
         free = [k for k, role in enumerate(roles) if not role and is_input(table, k)]
         for k in free[:1]:
             roles[k] = _INPUT
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the page shows the unit of each column
+        kind = _kind(path)
+        begin = starts_to_turn(read_gyroscope(path)) if kind == "gyroscope" else None
+    if kind == "pendulum" and {"Y", "Z", "beta"} <= {*roles}:
+        kind = ""  # read as a pendulum's bob, which x and y alone would be
     chosen = [k for k, heading in enumerate(table.headings) if heading.name not in ("", "_")][:_COLUMNS]
     return {
         "columns": [
@@ -48,8 +55,8 @@ def look(path: Path) -> dict[str, Any]:
         ],
         "rows": len(table),
         "meta": {name: _number(table.meta.get(name)) for name in _KNOWN},
-        "kind": (kind := _kind(path)),
-        "begin": starts_to_turn(read_gyroscope(path)) if kind == "gyroscope" else None,
+        "kind": kind,
+        "begin": begin,
         "units": {role: list(UNITS[_base(role)]) for role in ROLES} | {_INPUT: ["", *UNITS["m/s"]]},
     }
 

@@ -36,6 +36,10 @@ def guessed(table: Table) -> list[str]:
     if len(rates) > 1:
         best = max(rates, key=lambda k: _liveliness(table, k))
         roles = [role if role != "Omega" or k == best else "" for k, role in enumerate(roles)]
+    letters = [_letter(heading) for heading in table.headings]
+    if "beta" in roles and "Z" not in roles and {"x", "y"} <= set(letters):
+        # A camera's axes, with an orientation: of a disk.
+        roles = [{"x": "Y", "y": "Z"}.get(letter, role) for letter, role in zip(letters, roles, strict=True)]
     taken: set[str] = set()
     for k, role in enumerate(roles):
         roles[k] = "" if role in taken else role
@@ -76,7 +80,12 @@ def _role(heading: Heading) -> str:
     for role, role_words in _WORDS.items():
         if any(word in words for word in role_words):
             return role
-    return _LETTERS.get((heading.plain or heading.name).casefold().strip(), "")
+    return _LETTERS.get(_letter(heading), "")
+
+
+def _letter(heading: Heading) -> str:
+    """Return a heading without its unit, in lower case."""
+    return (heading.plain or heading.name).casefold().strip()
 
 
 def _liveliness(table: Table, k: int) -> float:
