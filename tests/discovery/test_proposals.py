@@ -79,3 +79,13 @@ def test_a_pair_far_behind_is_abandoned(fits):
 def test_the_best_pair_is_fitted_with_each_width_of_its_dry_friction(fits):
     pairs = table(OFFSET, WIDE, NARROW)._together([[OFFSET, WIDE]])
     assert [t.fit.chi2 for t in pairs] == [5000.0, 900.0]
+
+
+def test_a_curve_far_behind_a_law_is_abandoned(monkeypatch):
+    limits: list[float] = []
+    monkeypatch.setattr(proposals, "of_curve", lambda _fit, _curve, most: limits.append(most))
+    curve: Any = SimpleNamespace(title="friction as a function of Omega")
+    law = trial(POWER, chi2=1000.0)
+    table().curves([curve], proposals.far_behind([law, trial(CUBIC, chi2=3000.0)]))
+    assert limits == [1000.0 + 2 * EVIDENCE_MARGIN]
+    assert proposals.far_behind([]) == float("inf")

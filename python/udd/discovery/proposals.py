@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
-
-import numpy as np
 
 from udd._util import chi_squared
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
@@ -35,6 +34,12 @@ _COORDINATES = 4  # coordinates over which curves are located
 _HOPELESS = 2.0  # ratio to the best fit's chi2 above which a fit that does not converge is abandoned
 _FAR = 30.0  # nats by which a curve may score below the best term of the library
 _PAIRED = 4  # best-scored effects of which all pairs are fitted in full
+
+
+def far_behind(trials: Sequence[TrialFit]) -> float:
+    """Return the chi2 of a fit that is ten nats behind the best of these."""
+    # Without the margin a power hides quadratic and cubic drag, which explain almost as much.
+    return min((t.fit.chi2 for t in trials), default=math.inf) + 2 * EVIDENCE_MARGIN
 
 
 def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
@@ -78,7 +83,7 @@ class Proposals:
         tight = [t for t in trials if t.fit.level >= self.fit.level]
         loose = {t.candidates[0].effect.name for t in trials} - {t.candidates[0].effect.name for t in tight}
         if trials:
-            trials += self.curves(self._near_curves())
+            trials += self.curves(self._near_curves(), far_behind(tight))
         if trials and (self.fit.model.profile.discovery.pairs or any(t.curve for t in trials)):
             trials += self._pairs(loose, tight)
         return trials, loose
@@ -111,10 +116,10 @@ class Proposals:
         ]
         return self._together(likely), number
 
-    def curves(self, likely: list[Curve]) -> list[TrialFit]:
-        """Locate curves as splines."""
+    def curves(self, likely: list[Curve], most: float = math.inf) -> list[TrialFit]:
+        """Locate curves as splines; abandon those with a chi2 above `most`."""
         self.clock.trying([curve.title for curve in likely])
-        return fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve), likely))
+        return fitted_ones(self.clock.each(lambda curve: of_curve(self.fit, curve, most), likely))
 
     def tried(self, some: list[Scored]) -> list[TrialFit]:
         """Fit candidates in full, starting at the amplitudes that the score predicts."""
@@ -186,9 +191,7 @@ class Proposals:
 
     def _together(self, groups: list[list[Candidate]], singles: Sequence[TrialFit] = ()) -> list[TrialFit]:
         """Fit several effects at once, each group starting at the end of the best of its `singles`."""
-        # Without the margin a power hides quadratic and cubic drag, which explain almost as much.
-        least = min((t.fit.chi2 for t in singles), default=np.inf)
-        goal = Goal(self.fit.level, least + 2 * EVIDENCE_MARGIN)
+        goal = Goal(self.fit.level, far_behind(singles))
         starts = sorted((t for t in singles if t.curve is None), key=lambda t: t.fit.chi2)
 
         def together(group: list[Candidate]) -> TrialFit | None:

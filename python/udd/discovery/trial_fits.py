@@ -136,11 +136,11 @@ def with_more(
     return of_library(start, candidates, amplitudes, goal)
 
 
-def of_curve(current: Fit, curve: Curve) -> TrialFit | None:
-    """Fit a curve in full."""
+def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | None:
+    """Fit a curve in full; return None if that fails, or chi2 stays above `most`."""
     try:
         kind = "curve" if len(curve.coordinates) == 1 else "surface"
-        located = fit_curve(current, curve, _unused(current, kind))
+        located = fit_curve(current, curve, _unused(current, kind), most)
     except FitError:
         return None
     if not located.fit.converged:
