@@ -551,6 +551,16 @@ def test_the_command_line_names_its_own_options(
     assert said in failed(["fit", path, "--pendulum", "0.5", *more], capsys)
 
 
+def test_a_disk_that_is_read_as_a_bob_is_explained(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "disk.csv"
+    path.write_text("t,x (cm),y (cm),turn\n" + "".join(f"{row},1,{k}\n" for k, row in enumerate(SWING)))
+    assert main(["fit", str(path), "--W", "0.04"]) == 1
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert 'from x and y (of a disk say --columns "Y=...,Z=...,beta=...")' in error
+
+
 def test_messages_are_told_in_options() -> None:
     asked = in_options("say where the motion starts, state0={'v': ..., 'w': ...}")
     assert asked.endswith('"state0": {"v": ..., "w": ...} in the file of --model')
