@@ -18,6 +18,7 @@ import udd
 from film_for_tests import write
 from udd.errors import UddError
 from udd.tracking.detection.colour_blobs import COLOURS
+from udd.tracking.passes.pendulum_bob import _unlike
 
 Picture = NDArray[np.uint8]
 FRAMES = 14
@@ -94,3 +95,9 @@ def test_the_colour_of_what_moves_is_given(tmp_path: Path) -> None:
     film = write(tmp_path / "film.mp4", room(draw))
     with pytest.raises(UddError, match=r"no bob of that colour moves .* codes (19|20|21),(49|50|51),3[01]:"):
         udd.track(film, bob="green")
+
+
+def test_a_bob_that_is_not_used_says_why() -> None:
+    """A blurred dot in full view was "not seen, or partly hidden"."""
+    assert _unlike(0.0, 70, [70]) == "the bob is not seen" and _unlike(68, 70, [70]) == ""
+    assert "too small" in _unlike(50, 70, [62]) and "too large" in _unlike(100, 70, [70])

@@ -95,10 +95,9 @@ class BobTracker:
         blob, flag = None, _flag(picture, self.behind.picture)
         if not flag:
             blob = locate_bob(picture, self.behind, self.colour)
-            if blob is not None and not _whole(blob.area, self.size, self._areas):
-                blob = None
+            why = _unlike(0.0 if blob is None else blob.area, self.size, self._areas)
+            blob, flag = (None, lost(why)) if why else (blob, "")
             self._areas.append(None if blob is None else blob.area)
-            flag = "" if blob is not None else lost("the bob is not seen, or partly hidden")
         if blob is not None and self._last is not None and _copy(picture.y, self._last, blob, self._path):
             blob, flag = None, REPEATED
         if blob is not None:
@@ -107,11 +106,17 @@ class BobTracker:
         self._last = picture.y
 
 
-def _whole(area: float, size: float, recent: Iterable[float | None]) -> bool:
-    """Return a mask of whole bobs: light changes their size slowly, but an obstacle at once."""
+def _unlike(area: float, size: float, recent: Iterable[float | None]) -> str:
+    """Return why a patch is no whole bob, or an empty text; light changes its size slowly."""
+    if not area:
+        return "the bob is not seen"
     seen = [a for a in recent if a is not None]
     usual = float(np.median(seen)) if seen else size
-    return LEAST * size < area < MOST * size and HALF_HIDDEN * usual < area < TOO_MUCH * usual
+    if area <= LEAST * size or area <= HALF_HIDDEN * usual:
+        return "the bob looks too small: it is partly hidden, or blurred"
+    if area >= MOST * size or area >= TOO_MUCH * usual:
+        return "the bob looks too large: it is blurred, or something of its colour is beside it"
+    return ""
 
 
 def _flag(picture: Picture, behind: Picture) -> str:
