@@ -82,7 +82,7 @@ CASES = (
     Case("frames missing, even stamps", (0.05, 0.7, 0.02), {}, {"dropped": MISSING, "flat": True}),
     Case("noise reduction", (0.05, 0.7, 0.01), {"noise": 4.0}, {"denoise": 0.8}),
     Case("noise reduction, HEVC", (0.08, 1.0, 0.01), {"codec": "hevc", "noise": 4.0}, {"denoise": 0.8}),
-    Case("no drive, H.264", (0.08, 1.0, 0.01), {"codec": "h264", "quality": 28.0}, W=0.0),
+    Case("no drive, H.264", (0.5, 1.0, 0.01), {"codec": "h264", "quality": 28.0}, W=0.0),
 )
 
 
