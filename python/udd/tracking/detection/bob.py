@@ -24,7 +24,6 @@ CONTRAST = 18.0  # codes by which a pale bob must differ from the background
 ALIKE = 0.5  # of the change toward a pale bob's colour by which a pixel may change otherwise
 HUE, BRIGHTNESS = 2.0, 0.5  # weights of differences: lamps change the brightness of a colour, not its hue
 MOST_OTHER = 70.0  # weighted codes by which a pale bob may differ from the colour that was given
-TRIED = 4  # patches of a picture that may be the bob
 THIN = 0.5  # of the radius of a pale bob: thinner parts, as a rod, do not belong to it
 FEWEST = 5  # pictures of the survey that must show the bob
 
