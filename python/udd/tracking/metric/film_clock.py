@@ -35,6 +35,8 @@ WHOLE = 0.04  # relative difference within which a factor is a whole number or t
 PARTS = 6  # largest denominator of other factors, as 4/5 for 24 and 30 frames per second
 SURE = 2.5  # standard errors within which a factor is such a fraction
 LISTED = 6  # parts
+MOSTLY = 0.7  # share of the changes that must be the clock's
+CLOCKS = 8  # different clocks that a film may have
 AGREES = 0.6  # of gravity's relative error that remains if all changes are the clock's
 UNKNOWN = 0.2  # relative error of a factor by gravity from which on it does not decide
 ALIKE = 0.05  # of two clocks' logarithms between which gravity does not decide
@@ -106,10 +108,10 @@ def slow_parts(
     edges = _confirmed(every, speed, t[good], angle[good])
     if len(edges) < len(every) and precision(every) < AGREES * precision(edges):
         edges = every
-    if len(edges) < 3:
-        return []
+    if len(edges) < 3 or len(edges) - 2 < MOSTLY * (len(every) - 2):
+        return []  # the drive varies
     level, sigma = _shared(*_levels(edges, speed))
-    if level.min() <= 0:
+    if level.min() <= 0 or len(np.unique(level)) > CLOCKS:
         return []
     time = np.concatenate([[0.0], np.cumsum(np.diff(t[good]) * np.repeat(level, np.diff(edges)))])
     real = _real(
