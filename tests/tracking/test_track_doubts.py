@@ -25,7 +25,7 @@ from udd.film import Defects
 from udd.film.defects import real_times
 from udd.tracking.geometry.contact_point import pivot
 from udd.tracking.metric.apparent_gravity import apparent_gravity
-from udd.tracking.metric.film_clock import slow_parts
+from udd.tracking.metric.film_clock import _rational, slow_parts
 from udd.tracking.metric.turns import count_turns
 from udd.video.reader import Film, real_time, time_of
 
@@ -118,6 +118,33 @@ def test_missing_frames_are_seen_by_the_drive() -> None:
         slower = tuple((float(stamps[part.first]), part.factor) for part in parts)
         again = np.array([real_time(float(stamp), slower) for stamp in stamps])
         assert len(parts) > 2 and np.abs(again - taken).max() < 0.04  # 0.17 s and 3.7 s by the stamps
+
+
+def test_many_frames_missing_singly_are_seen_by_the_drive() -> None:
+    """Ten gaps of one to four frames in a film of 12 s have nine different clocks."""
+    t = np.arange(0, 12, 1 / 30)
+    missing = [31, 60, 61, 95, 128, 129, 130, 170, 200, 201, 202, 203, 241, 270, 271, 300, 333, 334]
+    taken = np.delete(t, missing)
+    centre, angle, _ = seen(taken, 3)
+    stamps = np.arange(len(taken)) / 30
+    parts = slow_parts(stamps, centre + 100 + 200j, angle, 0.08, SCALE)
+    slower = tuple((float(stamps[part.first]), part.factor) for part in parts)
+    again = np.array([real_time(float(stamp), slower) for stamp in stamps])
+    assert np.abs(again - taken).max() < 0.04  # 0.6 s by the stamps
+
+
+@pytest.mark.parametrize(
+    ("factor", "sigma", "expected"),
+    [
+        (8.095, 1e-3, 8.0),  # a phone's slow motion, whose ends lie between frames
+        (0.123, 1e-4, 0.125),
+        (0.8003, 2e-4, 0.8),
+        (0.8043, 2e-4, 0.8043),
+        (1.03, 1e-3, 1.0),
+    ],
+)
+def test_a_factor_near_a_whole_number_is_one(factor: float, sigma: float, expected: float) -> None:
+    assert _rational(factor, sigma) == expected
 
 
 @pytest.mark.parametrize("kind", ["even", "step", "swaying"])

@@ -35,8 +35,7 @@ WHOLE = 0.04  # relative difference within which a factor is a whole number or t
 PARTS = 6  # largest denominator of other factors, as 4/5 for 24 and 30 frames per second
 SURE = 2.5  # standard errors within which a factor is such a fraction
 LISTED = 6  # parts
-MOSTLY = 0.7  # share of the changes that must be the clock's
-CLOCKS = 8  # different clocks that a film may have
+MOSTLY = 0.9  # share of the speed's variance between parts that must be the clock's; a true map has 0.999
 AGREES = 0.6  # of gravity's relative error that remains if all changes are the clock's
 UNKNOWN = 0.2  # relative error of a factor by gravity from which on it does not decide
 ALIKE = 0.05  # of two clocks' logarithms between which gravity does not decide
@@ -108,10 +107,10 @@ def slow_parts(
     edges = _confirmed(every, speed, t[good], angle[good])
     if len(edges) < len(every) and precision(every) < AGREES * precision(edges):
         edges = every
-    if len(edges) < 3 or len(edges) - 2 < MOSTLY * (len(every) - 2):
+    if len(edges) < 3 or _between(edges, speed) < MOSTLY * _between(every, speed):
         return []  # the drive varies
     level, sigma = _shared(*_levels(edges, speed))
-    if level.min() <= 0 or len(np.unique(level)) > CLOCKS:
+    if level.min() <= 0:
         return []
     time = np.concatenate([[0.0], np.cumsum(np.diff(t[good]) * np.repeat(level, np.diff(edges)))])
     real = _real(
@@ -133,11 +132,12 @@ def text_of(parts: Sequence[SlowPart]) -> str:
 
 
 def _rational(factor: float, sigma: float) -> float:
-    """Return the simple fraction that a factor is within its error; otherwise the factor itself."""
-    fraction = Fraction(factor).limit_denominator(PARTS)
-    simple = fraction.numerator == 1 or fraction.denominator == 1
-    tolerance = max(WHOLE * factor if simple else 0.0, SURE * sigma)
-    return float(fraction) if fraction and abs(factor - fraction) < tolerance else factor
+    """Return the whole number, its inverse or the simple fraction that a factor is within its error."""
+    whole = float(round(factor)) if factor >= 1 else 1 / round(1 / factor)
+    if abs(factor - whole) < max(WHOLE * factor, SURE * sigma):
+        return whole
+    fraction = float(Fraction(factor).limit_denominator(PARTS))
+    return fraction if abs(factor - fraction) < SURE * sigma else factor
 
 
 def _pivot(t: Array, centre: NDArray[np.complex128], angle: Array, good: NDArray[np.intp]) -> complex:
@@ -197,6 +197,12 @@ def _cut(speed: Array, noise: float) -> list[int]:
             at = int(last[at])
         edges += ends[::-1]
     return edges
+
+
+def _between(edges: Sequence[int], speed: Array) -> float:
+    """Return the sum of squares of the speeds that a constant mean in each part explains."""
+    parts = [speed[a:b] for a, b in pairwise(edges)]
+    return float(sum(len(part) * (part.mean() - speed.mean()) ** 2 for part in parts))
 
 
 def _levels(edges: Sequence[int], speed: Array) -> tuple[Array, Array]:
