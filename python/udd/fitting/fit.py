@@ -26,10 +26,10 @@ from .model_error_schedule import (
     ANY,
     FEW,
     LEAP,
+    NAT,
     ROUGH,
     Goal,
     eased,
-    nearly_converged,
     provisional_fit,
     reduce_model_error,
     with_negligible_model_error,
@@ -39,7 +39,7 @@ from .parameters import Free, free_parameters, known_camera, names_of
 from .problem import FOLLOWS, Fit, Point, Problem, levels
 from .record import Record, record_of
 from .sensor import is_encoder
-from .solve import MOST, SolveError, done, solve
+from .solve import MOST, SolveError, solve
 from .units import Scale, ask, drive_seen, other_unit
 
 _NOISE_ROUNDS = 12
@@ -514,7 +514,8 @@ def most_probable(fitted: Fit) -> Fit:
     The model error of a film with less noise than its geometric error only gets smaller: a larger one would
     follow the geometry's faults, and all forms would be equal.
     """
-    tightest = _tightened(fitted, trusted=True)
+    # To the minimum itself a law with a kink converges slowly, and ends at a larger model error.
+    tightest = _tightened(fitted, trusted=True, enough=NAT)
     # Without this no form of a real pendulum's drag is distinguished from another.
     if (tightest.noise.factor < _least(fitted.measurements, search=True)).any():
         return tightest
@@ -522,21 +523,20 @@ def most_probable(fitted: Fit) -> Fit:
     # Without this, one form is compared at its most probable model error, another 180 nats below its own.
     if result.level < tightest.level:
         try:
-            result = solve(fitted.measurements, *_own_noise(result), decrease=done(result))
+            result = solve(fitted.measurements, *_own_noise(result), decrease=NAT)
         except SolveError:
             return tightest
     return result if result.converged else tightest
 
 
-def _tightened(fitted: Fit, trusted: bool) -> Fit:
+def _tightened(fitted: Fit, trusted: bool, enough: float | None = None) -> Fit:
     """Reduce the model error to the most probable one, with the fit's own noise if that is `trusted`."""
     schedule = levels(fitted.model.kind) or fitted.problem.schedule
     fitted = replace(fitted, problem=replace(fitted.problem, schedule=schedule))
     try:
         problem, point = _own_noise(fitted) if trusted else (fitted.problem, fitted.point)
-        result = reduce_model_error(fitted.measurements, problem, point, schedule[fitted.level :])
-        # A law with a kink converges slowly. Without this it is compared at the noise of the search.
-        result = result if result.converged else nearly_converged(result)
+        levels_left = schedule[fitted.level :]
+        result = reduce_model_error(fitted.measurements, problem, point, levels_left, enough=enough)
     except SolveError:  # for example, a threshold that ends at or below zero
         return fitted
     return result if result.converged else fitted

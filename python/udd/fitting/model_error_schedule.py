@@ -22,6 +22,8 @@ FEW = 12
 LEAP = 3  # levels that a right model can skip
 #: Decrease of chi2 below which a fit's noise no longer changes; its likelihood is then accurate enough.
 ROUGH = 10.0
+#: Decrease of chi2 by a nat, at which fits of different laws can be compared.
+NAT = 2.0
 #: Decrease in evidence (nats) that is acceptable when the model error is reduced.
 LESS = 3.0
 #: Model error in units of the last level's: at a tenth of it the standard errors change by less than 0.3 %.
@@ -67,12 +69,14 @@ def reduce_model_error(
     best: Fit | None = None,
     steps: int = STEPS,
     goal: Goal = ANY,
+    enough: float | None = None,
 ) -> Fit:
     """Minimise with a decreasing model-error variance: solve, reduce it, solve again from there.
 
     It ends at the level where the minimiser no longer converges, which a wrong model reaches early. If the
     problem asks for the most probable level, it ends where the evidence falls. `best` is a fit at a larger
     model error; it is returned if no tighter one converges. `steps` bounds the iterations at each level.
+    With `enough`, fits stop at this decrease of chi2, also the final one.
 
     Raises
     ------
@@ -83,21 +87,27 @@ def reduce_model_error(
     if best is None:
         if not levels:
             raise FitError("the fit has no level to solve at")
-        best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps)
+        best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps, enough)
         point = best.point
         _give_up_above(goal, best)
-    far = _skip_levels(best, point, levels) if problem.likeliest else None
+    far = _skip_levels(best, point, levels, enough) if problem.likeliest else None
     if far:
         best = _increase_model_error(far, levels)
     for diffusion in () if far else levels:
         if _explains_little(best, goal):
             return best
-        result = provisional_fit(measurements, best.problem.with_model_error(diffusion), point, steps)
+        tighter = best.problem.with_model_error(diffusion)
+        result = provisional_fit(measurements, tighter, point, steps, enough)
         if not _stands(result, best):
             break
         best, point = result, result.point
         _give_up_above(goal, best)
-    if best.problem.has_smallest_model_error or best.level < goal.level or _explains_little(best, goal):
+    if (
+        enough
+        or best.problem.has_smallest_model_error
+        or best.level < goal.level
+        or _explains_little(best, goal)
+    ):
         return best
     return _settled(best, schedule, steps)
 
@@ -127,11 +137,15 @@ def beyond_schedule(fitted: Fit) -> bool:
 
 
 def provisional_fit(
-    measurements: tuple[Measurement, ...], problem: Problem, point: Point, iterations: int = STEPS
+    measurements: tuple[Measurement, ...],
+    problem: Problem,
+    point: Point,
+    iterations: int = STEPS,
+    enough: float | None = None,
 ) -> Fit:
     """Fit on the way to a smaller model error; with noise autocorrelation if its likelihood matters."""
-    result = _nearly(solve(measurements, problem, point, iterations, _enough(problem)), iterations)
-    return with_noise_correlation(result) if problem.likeliest and result.converged else result
+    result = _nearly(solve(measurements, problem, point, iterations, enough or _enough(problem)), iterations)
+    return with_noise_correlation(result, enough) if problem.likeliest and result.converged else result
 
 
 def _nearly(fitted: Fit, steps: int) -> Fit:
@@ -158,14 +172,17 @@ def _stands(tighter: Fit, looser: Fit) -> bool:
     return tighter.converged and not less_likely
 
 
-def _skip_levels(best: Fit, point: Point, levels: Sequence[tuple[float, ...]]) -> Fit | None:
+def _skip_levels(
+    best: Fit, point: Point, levels: Sequence[tuple[float, ...]], enough: float | None = None
+) -> Fit | None:
     """Try to skip levels up to the last one: a right model converges from one level to the next in few steps.
 
     Return None if it does not converge; its last point is then no good start.
     """
     for diffusion in levels[(len(levels) - 1) % LEAP :: LEAP]:
         try:
-            result = provisional_fit(best.measurements, best.problem.with_model_error(diffusion), point, FEW)
+            tighter = best.problem.with_model_error(diffusion)
+            result = provisional_fit(best.measurements, tighter, point, FEW, enough)
         except FitError:
             return None
         if not _stands(result, best):
@@ -231,17 +248,8 @@ def with_negligible_model_error(fitted: Fit) -> Fit:
     )
 
 
-def nearly_converged(fitted: Fit) -> Fit:
-    """Return a fit that stops at a small decrease in chi2, with AR(1) noise if that raises the likelihood.
-
-    Its evidence is accurate enough for a comparison.
-    """
-    result = solve(fitted.measurements, fitted.problem, fitted.point, FEW, ROUGH)
-    return with_noise_correlation(result, ROUGH) if result.converged else fitted
-
-
-def with_noise_correlation(fitted: Fit, decrease: float | None = None) -> Fit:
-    """Refit with AR(1) noise if that raises the likelihood, until chi2 falls by less than `decrease`.
+def with_noise_correlation(fitted: Fit, enough: float | None = None) -> Fit:
+    """Refit with AR(1) noise if that raises the likelihood, until chi2 falls by less than `enough`.
 
     Frames with correlated noise carry less information than independent ones. Without this the model error
     would be too large, following the noise, and standard errors would be too small.
@@ -255,7 +263,7 @@ def with_noise_correlation(fitted: Fit, decrease: float | None = None) -> Fit:
         return fitted
     noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
     problem = replace(fitted.problem, noise=replace(noise, memory=memory))
-    result = solve(fitted.measurements, problem, fitted.point, STEPS, decrease or _enough(problem))
+    result = solve(fitted.measurements, problem, fitted.point, STEPS, enough or _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
 
 
