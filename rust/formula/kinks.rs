@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::{Binary, Expression, Leaf, Op, Unary};
+use crate::scalar::Scalar;
 use crate::sides::MAX_SURFACES;
 
 /// A function that is smooth on each side of the zeros of a surface's function.
@@ -34,6 +35,15 @@ impl Kink {
             Kink::Abs | Kink::Sign => 1,
             Kink::Min | Kink::Max => 2,
             Kink::Where => 3,
+        }
+    }
+
+    /// Its values on the positive and on the negative side of its surface, for numbers that it is a continuous function of.
+    pub(super) fn branches<S: Scalar>(self, a: S, b: S) -> (S, S) {
+        match self {
+            Kink::Min => (b, a),
+            Kink::Max => (a, b),
+            Kink::Abs | Kink::Sign | Kink::Where => (a, -a),
         }
     }
 

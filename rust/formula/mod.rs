@@ -110,6 +110,10 @@ pub enum Op {
     Where,
     /// A function with a kink, taken on this side of a surface.
     On(Kink, u8),
+    /// The same by the numbers themselves; while a model is recorded, on this side.
+    Compared(Kink, u8),
+    /// The first of two numbers, or the second if the first is negative and no model is recorded.
+    Defined,
 }
 
 impl Op {
@@ -118,9 +122,9 @@ impl Op {
         match self {
             Op::Push(_) => 0,
             Op::Unary(_) | Op::Spline(_) => 1,
-            Op::Binary(_) => 2,
+            Op::Binary(_) | Op::Defined => 2,
             Op::Where => 3,
-            Op::On(kink, _) => kink.takes(),
+            Op::On(kink, _) | Op::Compared(kink, _) => kink.takes(),
         }
     }
 
@@ -143,6 +147,8 @@ impl Op {
             Op::Spline(spline) => parse::SPLINES[usize::from(spline.periodic)],
             Op::Where => parse::WHERE,
             Op::On(kink, _) => kink.name(),
+            Op::Compared(..) => "compared",
+            Op::Defined => "defined",
         }
     }
 

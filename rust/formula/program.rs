@@ -52,6 +52,10 @@ enum Action {
     Turn(u8),
     /// 1 on the positive side of this surface, else -1.
     Sign(u8),
+    /// The kink's own value, which a recording takes on the side of this surface.
+    Compared(Kink, u8),
+    /// `a`, or `b` if `a` is negative; a recording has `a`.
+    Defined,
     /// By its number; its coefficients are in the registers from `b` on.
     Spline(u16),
 }
@@ -310,6 +314,17 @@ impl Program {
                 Action::Select(side) => S::select(sides[usize::from(side)], of!(a), of!(b)),
                 Action::Turn(side) => S::select(sides[usize::from(side)], of!(a), -of!(a)),
                 Action::Sign(side) => S::select(sides[usize::from(side)], S::one(), -S::one()),
+                Action::Compared(kink, side) => match kink {
+                    _ if S::SYMBOLIC => {
+                        let (yes, no) = kink.branches(of!(a), of!(b));
+                        S::select(sides[usize::from(side)], yes, no)
+                    }
+                    Kink::Min => Binary::Min.of(of!(a), of!(b)),
+                    Kink::Max => Binary::Max.of(of!(a), of!(b)),
+                    _ => Unary::Abs.of(of!(a)),
+                },
+                Action::Defined if S::SYMBOLIC => of!(a),
+                Action::Defined => S::select(of!(a).less(S::zero()), of!(b), of!(a)),
                 Action::Spline(own) => {
                     let spline = self.splines[usize::from(own)];
                     spline.of(of!(a), &|i| work.at(b + register(i - spline.first)))
@@ -328,6 +343,9 @@ struct Made {
     /// Parameters and numbers determine it.
     fixed: bool,
 }
+
+/// How deep in a product kinks are sought.
+const DEEPEST: usize = 16;
 
 /// The key of equal values: the operation's name, its numbers and its operands.
 type Likeness = (&'static str, [u64; 6], [usize; 3]);
@@ -364,9 +382,41 @@ impl Graph {
                     of[1] = if k == 0 { at } else { of[1] };
                 }
             }
+            if matches!(op, Op::Binary(Binary::Power) | Op::Unary(Unary::Sqrt | Unary::Ln)) {
+                of[0] = self.defined(of[0]);
+            }
             stack.push(self.value(op, of));
         }
         stack[0]
+    }
+
+    /// An argument of a function that negative numbers have no value of.
+    ///
+    /// A step may end beyond a surface, and is evaluated on the side where it began: there `abs(x)` is negative. A law
+    /// without a value would shorten steps for ever, so it has that of the kink itself.
+    fn defined(&mut self, i: usize) -> usize {
+        match self.compared(i, DEEPEST) {
+            other if other == i => i,
+            other => self.value(Op::Defined, [i, other, 0]),
+        }
+    }
+
+    /// A product of kinks by their own values, or the value itself if there are none.
+    fn compared(&mut self, i: usize, deepest: usize) -> usize {
+        let Made { op, of, .. } = self.made[i];
+        match op {
+            Op::On(kink @ (Kink::Abs | Kink::Min | Kink::Max), side) => {
+                self.value(Op::Compared(kink, side), of)
+            }
+            Op::Unary(Unary::Neg) | Op::Binary(Binary::Mul | Binary::Div) if deepest > 0 => {
+                let mut new = of;
+                for k in 0..op.takes() {
+                    new[k] = self.compared(of[k], deepest - 1);
+                }
+                if new == of { i } else { self.value(op, new) }
+            }
+            _ => i,
+        }
     }
 
     /// The coefficient `k` of a curve.
@@ -380,6 +430,7 @@ impl Graph {
         let mut numbers = [op.number().to_bits(), 0, 0, 0, 0, 0];
         match op {
             Op::On(_, side) => numbers[1] = 1 + u64::from(side),
+            Op::Compared(kink, side) => numbers[1] = 1 + u64::from(side) + ((kink as u64) << 8),
             Op::Spline(own) => {
                 numbers = [own.first as u64, own.count as u64, own.low.to_bits(), own.per.to_bits(), 0, 0];
             }
@@ -387,7 +438,7 @@ impl Graph {
         }
         let fixed = match op {
             Op::Push(leaf) => matches!(leaf, Leaf::Number(_) | Leaf::Parameter(_)),
-            Op::On(..) => false,
+            Op::On(..) | Op::Compared(..) => false,
             op => needed(op).all(|i| self.made[of[i]].fixed),
         };
         let unary = u64::from(op.takes() == 1);
@@ -501,7 +552,7 @@ impl Action {
             Action::Sign(_) => 0,
             Action::Neg | Action::Square | Action::Unary(_) | Action::Turn(_) | Action::Spline(_) => 1,
             Action::Add | Action::Sub | Action::Mul | Action::Div | Action::Binary(_) => 2,
-            Action::SquareAdd | Action::Select(_) => 2,
+            Action::SquareAdd | Action::Select(_) | Action::Compared(..) | Action::Defined => 2,
             Action::MulMul | Action::MulAdd | Action::MulSub | Action::SubMul | Action::Where => 3,
             Action::SubMulMul | Action::MulAddMul | Action::MulSubMul => 4,
         }
@@ -563,6 +614,10 @@ impl<'a> Registers<'a> {
             Op::Where => Action::Where,
             Op::On(Kink::Abs, side) => Action::Turn(side),
             Op::On(Kink::Sign, side) => Action::Sign(side),
+            Op::Compared(kink, side) => {
+                return (Action::Compared(kink, side), [a, if kink.takes() == 1 { a } else { b }, a, a]);
+            }
+            Op::Defined => Action::Defined,
             Op::On(Kink::Max, side) => Action::Select(side),
             // The surface is where the first number is the second.
             Op::On(Kink::Min, side) => return (Action::Select(side), [b, a, a, a]),
@@ -679,5 +734,36 @@ mod tests {
         let own = program(&texts[..1]);
         let wanted = Spline::new(0, 4, (0.0, 4.0), false).of(2.0, &|i| [5.0, 3.0, 1.5, -2.5][i]);
         assert_eq!(values(&own, [5.0, 3.0]), [wanted]);
+    }
+
+    /// A step that ends beyond a surface evaluates the law on the side where it began.
+    #[test]
+    fn roots_of_kinks_have_values_on_either_side() {
+        let (states, parameters) = (["x", "y"].map(str::to_owned), ["a", "b"].map(str::to_owned));
+        let names = Names { states: &states, parameters: &parameters, inputs: &[], rates: false };
+        for (text, at_4, beyond) in [
+            ("abs(x)^1.5", 8.0, 8.0),
+            ("abs(x)^b", 2.0, 2.0),
+            ("sqrt(9*abs(x)/a)", 3.0, 3.0),
+            ("sqrt(-min(-x, 0))", 2.0, 0.0),
+            ("max(x, y)^0.5*y", 2.0, 1.0),
+            ("ln(abs(x))", 4.0_f64.ln(), 4.0_f64.ln()),
+            // Without a root the law continues as it is on its side.
+            ("abs(x)*1.5", 6.0, -6.0),
+        ] {
+            let mut formula = Expression::parse(text, names).unwrap();
+            let mut kinks = crate::formula::Kinks::default();
+            kinks.of(&mut formula);
+            let program = Program::of([&formula]);
+            let value = |x: f64, side: bool| {
+                let (place, mut results) = (Place { t: 0.0, x: &[x, 1.0], rates: &[], inputs: &[] }, [0.0]);
+                program.run(&place, &program.fix(&[4.0, 0.5]), &[side; MAX_SURFACES], &mut results);
+                results[0]
+            };
+            let side = !text.contains("min");
+            let close = |a: f64, b: f64| (a - b).abs() < 1e-14;
+            assert!(close(value(4.0, side), at_4), "{text}: {}", value(4.0, side));
+            assert!(close(value(-4.0, side), beyond), "{text}: {}", value(-4.0, side));
+        }
     }
 }

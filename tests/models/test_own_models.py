@@ -299,3 +299,23 @@ def test_both_wells_have_their_basin() -> None:
     # The law is odd, and so is the grid.
     np.testing.assert_allclose(result.fraction, [0.5, 0.5])
     np.testing.assert_allclose(np.sort(result.orbit_x.values.ravel()), [-1.0, 1.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "dop853", "auto"])
+@pytest.mark.parametrize(
+    "law", ["-abs(u)^1.5*sign(u) - x", "-abs(u)^n*u - x", "-sqrt(abs(u)/2)*u - x", "-max(u, 0)^0.5 - x"]
+)
+def test_roots_of_kinks_are_crossed(law: str, method: Any) -> None:
+    from scipy.integrate import solve_ivp
+
+    model = udd.Model(["u", "x"], {"u": law, "x": "u"}, {"n": 0.5})
+    run = udd.simulate(model, [0.0, 10.0], [1.0, 0.3], method=method)
+    assert run.outcome == "finished"
+    force: Callable[[float], float] = {
+        "-abs(u)^1.5*sign(u) - x": lambda u: -(abs(u) ** 1.5) * np.sign(u),
+        "-abs(u)^n*u - x": lambda u: -np.sqrt(abs(u)) * u,
+        "-sqrt(abs(u)/2)*u - x": lambda u: -np.sqrt(abs(u) / 2) * u,
+        "-max(u, 0)^0.5 - x": lambda u: -np.sqrt(max(u, 0.0)),
+    }[law]
+    exact = solve_ivp(lambda t, s: [force(s[0]) - s[1], s[0]], [0.0, 10.0], [1.0, 0.3], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(run.state[-1], exact.y[:, -1], atol=1e-6)

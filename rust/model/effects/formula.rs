@@ -185,7 +185,7 @@ fn degree(function: &Expression, is_amplitude: &[bool]) -> Degree {
                 (Some(Zero), own) if !own.contains(&true) => Zero,
                 _ => Other,
             },
-            Op::Where | Op::On(..) => {
+            Op::Where | Op::On(..) | Op::Compared(..) | Op::Defined => {
                 let mut any = false;
                 for _ in 0..op.takes() {
                     any |= stack.pop() != Some(Zero);
