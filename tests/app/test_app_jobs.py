@@ -307,11 +307,11 @@ def test_a_films_size_is_limited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     sample = Path(udd.__file__).parent / "demo" / "sample.mp4"
     monkeypatch.setattr(limits, "PIXELS", 1000)
     with pytest.raises(udd.errors.UddError, match="too large"):
-        worker._tracked(sample, 0.08, lambda _: None)
+        worker._tracked(sample, 0.08, {}, lambda _: None)
     monkeypatch.undo()
     monkeypatch.setattr(limits, "FRAMES", 100)
     with pytest.raises(udd.errors.UddError, match="at most 100"):
-        worker._tracked(sample, 0.08, lambda _: None)
+        worker._tracked(sample, 0.08, {}, lambda _: None)
 
 
 def test_the_marks_are_told_while_a_film_is_tracked(tmp_path: Path) -> None:
@@ -322,7 +322,7 @@ def test_the_marks_are_told_while_a_film_is_tracked(tmp_path: Path) -> None:
     run = udd.simulate(udd.Disk(0.03), times, [2.0, 0.02, -0.02, 0.0])
     film = udd.render(run, tmp_path / "short.mp4", size=(330, 420), scale=1050)
     told: list[dict[str, Any]] = []
-    measured = worker._tracked(film.path, 0.08, told.append)
+    measured = worker._tracked(film.path, 0.08, {}, told.append)
     frames = [message for message in told if "frame" in message]
     assert frames[-1]["frame"]["number"] == frames[-1]["frame"]["of"] == len(measured)
     picture = cv2.imdecode(np.frombuffer(base64.b64decode(frames[-1]["jpeg"]), np.uint8), cv2.IMREAD_COLOR)

@@ -615,7 +615,7 @@ def test_what_is_not_known_is_asked_for(
 ) -> None:
     bare = tmp_path / "bare.csv"
     bare.write_text(CSV)
-    assert "say --W in m/s (--W 0 where" in failed(["fit", bare], capsys)
+    assert "say --W in m/s (--W 0 if" in failed(["fit", bare], capsys)
     assert "--pendulum LENGTH" in failed(["fit", swing], capsys)
     film = tmp_path / "film.mp4"
     film.write_bytes(b"anything")

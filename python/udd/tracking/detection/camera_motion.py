@@ -153,7 +153,6 @@ def _about_median(motion: CameraMotion) -> CameraMotion:
 
 
 NOWHERE = (complex(np.nan, np.nan), complex(np.nan, np.nan), np.nan, (np.nan, np.nan, np.nan))
-AT_REST = 0.05  # pixels by which a picture may be off to be followed as it is
 LEAST = 0.01  # pixels: no point is followed better
 Row = tuple[complex, complex, float, tuple[float, float, float]]  # of one frame: as the fields of the motion
 
@@ -267,8 +266,6 @@ class Background:
         """Views to start from, and the picture as it would be from the first one's, about as bright."""
         y = _as_light(y, float(np.median(self.first[::4, ::4])) / max(float(np.median(y[::4, ::4])), 1.0))
         factor, shift = self.view
-        if abs(factor - 1) * abs(self.middle) + abs(factor * self.middle + shift - self.middle) < AT_REST:
-            factor, shift = 1 + 0j, 0j  # nothing to resample
         yield factor, shift, _seen_from(y, factor, shift)
         if abs(factor - 1) + abs(shift) > 0.5:
             yield 1 + 0j, 0j, y

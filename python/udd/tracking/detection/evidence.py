@@ -1,4 +1,4 @@
-"""What the pictures of a film show when no disk is seen in them: the brightness, and patches by colour."""
+"""Brightness of a film's pictures, and patches by colour, for a film in which no disk is seen."""
 
 from __future__ import annotations
 
