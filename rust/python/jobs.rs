@@ -57,7 +57,7 @@ pub struct Batch<'py> {
 
 impl<'py> Batch<'py> {
     pub fn model(&self) -> PyResult<AnyModel> {
-        Ok(AnyModel::from_python(&self.model)?)
+        AnyModel::from_python(&self.model)
     }
 
     pub fn tolerance(&self) -> Tolerance {
