@@ -208,49 +208,48 @@ class Acceptance:
         it: with it they are less probable than without.
         """
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
-        refuted: list[TrialFit] = []
         while trials:
-            addition = self._first_passing(current, trials, scores, refuted)
-            if addition or not refuted:
-                return addition
+            order = named(ranked(self.hypotheses(current, trials, scores)), self.known_parameters)
+            most = max((h.log_z for h in order), default=0.0)
+            refuted: list[TrialFit] = []
+            for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
+                judged = self.judged(current, chosen.trial, scores, chosen.again)
+                if judged is None:
+                    continue
+                errors = self.errors_or_none(chosen.trial.fit) if judged.witness else None
+                if judged.witness and errors is not None and not self.worse(current.errors, errors):
+                    step = self._step(chosen, judged, judged.witness, order, scores.library)
+                    return step, SearchState(chosen.trial.fit, judged.whole, errors)
+                if judged.witness or judged.ratio[1] > 1.0:
+                    refuted.append(chosen.trial)
+            if not refuted:
+                return None
             # Without this a curve over the speed that follows a camera's errors hides a string's drag.
             curves = [t.curve for t in refuted if t.curve is not None]
-            trials = [t for t in trials if t not in refuted and not any(t.curve is c for c in curves)]
-            refuted.clear()
+            trials = [t for t in trials if t not in refuted and t.curve not in curves]
         return None
 
-    def _first_passing(
-        self, current: SearchState, trials: list[TrialFit], scores: ScoreRound, refuted: list[TrialFit]
-    ) -> tuple[Step, SearchState] | None:
-        """Return the first hypothesis within ten nats of the best that passes; list refuted ones."""
-        order = named(ranked(self.hypotheses(current, trials, scores)), self.known_parameters)
-        most = max((h.log_z for h in order), default=0.0)
-        for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
-            trial = chosen.trial
-            judged = self.judged(current, trial, scores, chosen.again)
-            if judged is None:
-                continue
-            if judged.witness is None:
-                refuted += [chosen.trial] if judged.ratio[1] > 1.0 else []
-                continue
-            errors = self.errors_or_none(trial.fit)
-            if errors is None or self.worse(current.errors, errors):
-                refuted.append(chosen.trial)
-                continue
-            step = Step(
-                candidates=trial.candidates,
-                curve=trial.curve,
-                chi2=judged.chi2,
-                p=judged.p,
-                ratio=judged.ratio,
-                witness=judged.witness,
-                alternatives=self._alternatives(chosen, order, scores.library),
-                formula=trial.formula,
-                names=trial.names,
-                cost=log_evidence(chosen.whole, chosen.again.names) - chosen.log_z,
-            )
-            return step, SearchState(trial.fit, judged.whole, errors)
-        return None
+    def _step(
+        self,
+        chosen: Hypothesis,
+        judged: TestResult,
+        witness: Confirmation,
+        order: Sequence[Hypothesis],
+        scanned: Scan,
+    ) -> Step:
+        """Describe an accepted hypothesis, with its rivals among the others."""
+        return Step(
+            candidates=chosen.trial.candidates,
+            curve=chosen.trial.curve,
+            chi2=judged.chi2,
+            p=judged.p,
+            ratio=judged.ratio,
+            witness=witness,
+            alternatives=self._alternatives(chosen, order, scanned),
+            formula=chosen.trial.formula,
+            names=chosen.trial.names,
+            cost=log_evidence(chosen.whole, chosen.again.names) - chosen.log_z,
+        )
 
     def log_evidence(self, fitted: Fit, steps: Sequence[Step]) -> float:
         """Compute the log evidence of a fit of all data after these steps, with their priors."""

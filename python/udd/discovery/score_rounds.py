@@ -92,9 +92,10 @@ def score_round(
     """Score every candidate and curve around the fit; with more model error if it explains little.
 
     A wrong chaotic model shows what it lacks only with a large model error: high scores around a tighter fit
-    may be misleading. The tighter fit counts if the looser one shows nothing, as with few data. For other
-    models both are scored, and the scores with the stronger explanation count: slow decays show only with a
-    small model error. If the model needs more model error than the schedule has, only the looser fit counts.
+    may be misleading. So does a model that needs more model error than the schedule has. For these the
+    tighter fit counts only if the looser one shows nothing, as with few or exact data. For other models both
+    are scored, and the scores with the stronger explanation count: slow decays show only with a small model
+    error.
     `given` are the user's own candidates; `watched` wraps work so that it does not start once a search's time
     is up.
     """
@@ -109,10 +110,11 @@ def score_round(
         return ScoreRound(current, scanned, curves.curves, comparisons)
 
     looser = with_larger_model_error(fitted, _SCATTER)
-    alone = looser is fitted or beyond_schedule(looser)
-    chaotic = fitted.model.profile.discovery.chaotic
-    rounds = parallel_map(watched(score), [looser] if alone or chaotic else [fitted, looser])
-    if looser is not fitted and len(rounds) == 1 and not (rounds[0].passing() or rounds[0].passing_curves()):
+    if looser is fitted:
+        return watched(score)(fitted)
+    both = not (fitted.model.profile.discovery.chaotic or beyond_schedule(looser))
+    rounds = parallel_map(watched(score), [fitted, looser] if both else [looser])
+    if not (both or rounds[0].passing() or rounds[0].passing_curves()):
         rounds.append(watched(score)(fitted))
     return replace(
         max(rounds, key=ScoreRound.strongest), comparisons=sum(entry.comparisons for entry in rounds)

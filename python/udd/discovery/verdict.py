@@ -71,7 +71,7 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
             result.append(
                 f"{effect.title}: as a swing decays, the effects of time and of amplitude are confounded."
             )
-        # Without this, a wave of 1.2 periods stands for half of a harvest that saturates (ODEBench 18).
+        # Without this, a cubic term and a wave of 1.2 periods are identified for one that saturates.
         if _periods(effect, final) < _PERIODS:
             result.append(f"{effect.title}: the record contains fewer than two of its periods.")
         elif not effect.is_law:

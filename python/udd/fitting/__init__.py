@@ -27,7 +27,6 @@ from .model_error_schedule import (
     far_off,
     smoothed_states,
     with_larger_model_error,
-    with_noise_of,
 )
 from .problem import Fit
 from .record import Record, record_of
@@ -62,6 +61,5 @@ __all__ = [
     "started_at",
     "widened",
     "with_larger_model_error",
-    "with_noise_of",
     "within",
 ]

@@ -295,14 +295,6 @@ def at_level(fitted: Fit, level: int) -> Fit:
     return solve(fitted.measurements, problem, fitted.point, decrease=done(fitted))
 
 
-def with_noise_of(fitted: Fit, other: Fit) -> Fit:
-    """Fit the same model with the noise of another fit of the same data, so that chi2 can be compared."""
-    if fitted.problem.noise is other.problem.noise:
-        return fitted
-    problem = replace(fitted.problem, noise=other.problem.noise)
-    return solve(fitted.measurements, problem, fitted.point, decrease=done(fitted))
-
-
 def eased(fitted: Fit) -> Fit:
     """Fit the same model at the most probable model error, starting at the end of a fit."""
     problem = replace(fitted.problem, likeliest=True)
