@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from udd.errors import MeasurementError
 
 from .table import Measurement
@@ -18,11 +16,9 @@ def between(record: Measurement, begin: float | None = None, end: float | None =
         Fewer than two rows lie in between.
     """
     first, last = float(record.t[0]), float(record.t[-1])
-    inside = (record.t >= (-math.inf if begin is None else begin)) & (
-        record.t <= (math.inf if end is None else end)
-    )
+    begin, end = first if begin is None else begin, last if end is None else end
+    inside = (record.t >= begin) & (record.t <= end)
     if inside.sum() < 2:
-        begin, end = first if begin is None else begin, last if end is None else end
         raise MeasurementError(
             f"the part from {begin:.4g} to {end:.4g} s has fewer than two rows; the record's times go from "
             f"{first:.4g} to {last:.4g} s"

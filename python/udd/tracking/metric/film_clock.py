@@ -87,8 +87,9 @@ def slow_parts(
     usual, noise = float(np.median(np.abs(speed))), _noise(speed)
     if not usual > 0 or noise > NOISE * float(np.quantile(speed, 0.9)):
         return []
+    stamps, turned = t[good], angle[good]
     away = np.conj(centre[good] - pivot) / scale
-    values = np.column_stack([away.real, away.imag, angle[good]])
+    values = np.column_stack([away.real, away.imag, turned])
 
     def too_long(time: Array) -> tuple[float, float]:
         """Return the factor by which times (n,) are too long by gravity, and its error."""
@@ -98,13 +99,13 @@ def slow_parts(
         return gravity.slower, 0.5 * gravity.slower * gravity.sigma / abs(gravity.value)
 
     def precision(edges: Sequence[int]) -> float:
-        factor, sigma = too_long(_clock(edges, speed, t[good]))
+        factor, sigma = too_long(_clock(edges, speed, stamps))
         return sigma / factor
 
     every = _cut(speed, max(noise, 1e-3 * usual))
     if len(every) < 3:
         return []
-    edges = _confirmed(every, speed, t[good], angle[good])
+    edges = _confirmed(every, speed, stamps, turned)
     if len(edges) < len(every) and precision(every) < AGREES * precision(edges):
         edges = every
     if len(edges) < 3 or _between(edges, speed) < MOSTLY * _between(every, speed):
@@ -112,10 +113,8 @@ def slow_parts(
     level, sigma = _shared(*_levels(edges, speed))
     if level.min() <= 0:
         return []
-    time = np.concatenate([[0.0], np.cumsum(np.diff(t[good]) * np.repeat(level, np.diff(edges)))])
-    real = _real(
-        edges, level, float(time[-1] / (t[good[-1]] - t[good[0]])), lambda real: too_long(time / real)
-    )
+    time = _retimed(stamps, edges, level)
+    real = _real(edges, level, float(time[-1] / np.ptp(stamps)), lambda real: too_long(time / real))
     parts: list[SlowPart] = []
     for first, mean, error in zip(edges[:-1], level, sigma, strict=True):
         factor, off = real / mean, real / mean * error / mean
@@ -229,8 +228,12 @@ def _shared(level: Array, sigma: Array) -> tuple[Array, Array]:
 def _clock(edges: Sequence[int], speed: Array, t: Array) -> Array:
     """Return times (n,) by the drive, the level of the longest part being real time."""
     level = np.maximum(_levels(edges, speed)[0], 1e-9)
-    level = level / level[np.argmax(np.diff(edges))]
-    return np.concatenate([[0.0], np.cumsum(np.diff(t) * np.repeat(level, np.diff(edges)))])
+    return _retimed(t, edges, level / level[np.argmax(np.diff(edges))])
+
+
+def _retimed(t: Array, edges: Sequence[int], factors: Array) -> Array:
+    """Return times (n,) from 0 on, whose intervals are multiplied by a factor in each part."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(t) * np.repeat(factors, np.diff(edges)))])
 
 
 def _confirmed(edges: list[int], speed: Array, t: Array, angle: Array) -> list[int]:

@@ -115,7 +115,7 @@ def _unlike(area: float, size: float, recent: Iterable[float | None]) -> str:
     if area <= LEAST * size or area <= HALF_HIDDEN * usual:
         return "the bob looks too small: it is partly hidden, or blurred"
     if area >= MOST * size or area >= TOO_MUCH * usual:
-        return "the bob looks too large: it is blurred, or something of its colour is beside it"
+        return "the bob looks too large: it is blurred, or touches something of its colour"
     return ""
 
 
@@ -234,7 +234,7 @@ def _check_hanging(
     if chord < path.radius and max(bend, scatter) < STRAIGHT * chord:
         raise TrackError(
             f"{film.path}: the bob's path is almost straight: it bends by {bend:.1f} of {chord:.0f} pixels, "
-            "as a lens bends a line. What rolls or slides is no pendulum; for a pendulum give pivot=(u, v)"
+            "as a lens bends a line. A rolling object is no pendulum; if this is one, give pivot=(u, v)"
         )
     if not unsure and ((at - path.centre).imag < 0).all():  # v goes down
         raise TrackError(
