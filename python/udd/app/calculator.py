@@ -1,8 +1,8 @@
 """A process that computes for the pages: `python -m udd.app.calculator KIND`.
 
-It reads questions from its input and writes answers to its output. A question is a pickle of the seconds of
-processor time that it may take, a function of this package and its arguments; None stops the work. An answer
-is the length of a pickle, then the pickle. Both come from this package alone, never from a visitor.
+It reads questions from its input and writes answers to its output. Both are the length of a pickle, then the
+pickle. A question has the seconds of processor time that it may take, a function of this package and its
+arguments; a length of zero stops the work. Both come from this package alone, never from a visitor.
 """
 
 from __future__ import annotations
@@ -30,31 +30,37 @@ def main() -> None:
     source, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     child_process.limit()
+    work = Interruptible()
+    questions: queue.SimpleQueue[tuple[threading.Event, bytes]] = queue.SimpleQueue()
+    # Before the imports: a process whose server has ended meanwhile must end too.
+    threading.Thread(target=_listen, args=(source, work, questions), daemon=True).start()
     for module in _NEEDED:  # before the first question, which would wait for them
         importlib.import_module(f"{__package__}.{module}")
     if sys.argv[1:] == ["maps"]:
         sys.modules[f"{__package__}.maps"].warm_up()
-    work = Interruptible()
-    questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(source, work, questions), daemon=True).start()
     while True:
-        answer = pickle.dumps(_answer(work, *questions.get()))
+        stopped, question = questions.get()
+        answer = pickle.dumps(_answer(work, stopped, *pickle.loads(question)))
         answers.write(LENGTH.pack(len(answer)))
         answers.write(answer)
         answers.flush()
 
 
-def _listen(source: BinaryIO, work: Interruptible, questions: queue.SimpleQueue[Any]) -> None:
+def _listen(
+    source: BinaryIO, work: Interruptible, questions: queue.SimpleQueue[tuple[threading.Event, bytes]]
+) -> None:
     try:
         stopped = threading.Event()
         while True:
-            question = pickle.load(source)
-            if question is None:
+            (size,) = LENGTH.unpack(source.read(LENGTH.size))
+            if size:
+                stopped = threading.Event()
+                questions.put((stopped, source.read(size)))
+            else:
                 stopped.set()  # for work that has not begun
                 work.stop(StoppedError("the work was stopped"))
-            else:
-                stopped = threading.Event()
-                questions.put((stopped, *question))
+    except struct.error:  # the input has ended
+        pass
     finally:
         os._exit(0)
 

@@ -194,7 +194,7 @@ class _Calculator:
     def stop(self) -> None:
         """Make the process stop its work, or end it."""
         self.stopping = True
-        self._say(None)
+        self._write(b"")
         self._loop.call_later(_GRACE, self._give_up, self.began)
 
     def _give_up(self, began: float) -> None:
@@ -204,7 +204,7 @@ class _Calculator:
     async def _answer(self, question: tuple[Any, ...]) -> Any:
         assert self._process is not None and self._process.stdout is not None
         try:
-            self._say(question)
+            self._write(pickle.dumps(question))
             (size,) = LENGTH.unpack(await self._process.stdout.readexactly(LENGTH.size))
             answer = pickle.loads(await self._process.stdout.readexactly(size))
             self.size = size
@@ -215,9 +215,9 @@ class _Calculator:
         self.ready = True
         return answer
 
-    def _say(self, question: tuple[Any, ...] | None) -> None:
+    def _write(self, question: bytes) -> None:
         if self._process is not None and self._process.stdin is not None:
-            self._process.stdin.write(pickle.dumps(question))
+            self._process.stdin.write(LENGTH.pack(len(question)) + question)
 
     def kill(self) -> None:
         """End the process."""
