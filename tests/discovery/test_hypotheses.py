@@ -60,7 +60,8 @@ def motion(*laws: udd.effects.Effect) -> Any:
     states = np.column_stack([3.0 * np.exp(-t / 20) * np.sin(4.4 * t), np.exp(-t / 20) * np.cos(4.4 * t)])
     model = udd.Pendulum(0.5, k0=0.01, effects=list(laws))
     record = SimpleNamespace(film=np.zeros(len(t), int), t=t)
-    return SimpleNamespace(model=model, record=record, states=states, parameters=dict(model.parameters))
+    fitted = {name: value for name, value in model.parameters.items() if not name.endswith("eps")}
+    return SimpleNamespace(model=model, record=record, states=states, parameters=fitted)
 
 
 def hypothesis(log_z: float, *laws: udd.effects.Effect, **written: Any) -> Hypothesis:
@@ -82,6 +83,7 @@ KNOWN = ["k0", "length", "inertia"]
         (CUBIC, QUADRATIC, False),
         (COULOMB, QUADRATIC, False),
         (udd.effects.stribeck(c=0.002, fade=3.7), COULOMB, True),  # where it fades at 20 rad/s
+        (udd.effects.stribeck(c=0.0035, fade=2.8), COULOMB, True),
         (COULOMB, udd.effects.stribeck(c=0.002, fade=3.7), False),
     ],
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -146,43 +146,48 @@ def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]
     target = unabsorbed(model.rates(t, states))
     size = float(np.linalg.norm(target))
     effects = law.whole.model.effects[len(law.whole.model.effects) - len(law.trial.candidates) :]
-    start = {f"{e.name}.{p}": e.parameters[p] for e in effects for p in e.parameters}
-    varied = [name for name in start if name in law.whole.parameters]
-    if not (size > 0 and varied):
+    values = {f"{e.name}.{p}": e.parameters[p] for e in effects for p in e.parameters}
+    constants = {name: value for name, value in values.items() if name in law.whole.parameters}
+    if size == 0.0:
         return False
     base = plain.with_effects((*plain.effects, *effects))
-    scale = np.array([abs(start[name]) or 1.0 for name in varied])
 
-    def residual(x: Array) -> Array:
-        try:
-            tried = base.with_parameters(dict(zip(varied, (x * scale).tolist(), strict=True)))
-            off = (unabsorbed(tried.rates(t, states)) - target) / size
-        except ModelError:
-            return np.full(target.shape, 1e3)
-        return np.where(np.isfinite(off), off, 1e3)
+    def distance(limit: Mapping[str, float]) -> float:
+        """Fit the constants that are not at a limit; return the relative difference that is left."""
+        varied = [name for name in constants if name not in limit]
+        scale = np.array([abs(constants[name]) or 1.0 for name in varied])
 
-    for begin in _starts(effects, start, varied):
+        def residual(x: Array) -> Array:
+            try:
+                fitted = dict(zip(varied, (x * scale).tolist(), strict=True))
+                rates = base.with_parameters(fitted | dict(limit)).rates(t, states)
+                off = (unabsorbed(rates) - target) / size
+            except ModelError:
+                return np.full(target.shape, 1e3)
+            return np.where(np.isfinite(off), off, 1e3)
+
+        start = np.array([constants[name] for name in varied]) / scale
         try:
-            solved = least_squares(residual, begin / scale, max_nfev=30 * (len(varied) + 1))
+            solved = least_squares(residual, start, max_nfev=30 * (len(varied) + 1))
         except ValueError:
-            continue
-        if np.linalg.norm(solved.fun) < _EQUAL:
-            return True
-    return False
+            return math.inf
+        return float(np.linalg.norm(solved.fun))
+
+    return any(distance(limit) < _EQUAL for limit in _limits(effects, constants))
 
 
-def _starts(effects: Sequence[Effect], values: Mapping[str, float], varied: Sequence[str]) -> Iterator[Array]:
-    """Yield the fitted constants, and the same with each shape at the ends of its range.
+def _limits(effects: Sequence[Effect], constants: Iterable[str]) -> Iterator[dict[str, float]]:
+    """Yield no limit, then each fitted shape at the ends of its range.
 
     A law may become another one only there, as Stribeck's friction becomes dry friction.
     """
-    yield np.array([values[name] for name in varied])
+    yield {}
     for effect in effects:
         for p in effect.spec.parameters:
             name = f"{effect.name}.{p.name}"
-            for end in p.range if p.role == "shape" and name in varied else ():
+            for end in p.range if p.role == "shape" and name in constants else ():
                 if np.isfinite(end):
-                    yield np.array([end if other == name else values[other] for other in varied])
+                    yield {name: end}
 
 
 def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
