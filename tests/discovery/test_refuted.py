@@ -14,11 +14,19 @@ from udd.discovery.hypotheses import Hypothesis
 UNTESTED = (math.nan, math.nan, math.nan)
 
 
-def trial(name: str, curve: Any = None) -> Any:
+class Located:
+    """A curve: each fit has one of its own."""
+
+    def __init__(self, name: str) -> None:
+        self.name = (name,)
+
+
+def trial(name: str, curve: str = "") -> Any:
     fit = SimpleNamespace(level=4)
     title = SimpleNamespace(title=name)
+    located = Located(curve) if curve else None
     return SimpleNamespace(
-        candidates=[title], curve=curve, formula=None, fit=fit, names=[], needed=True, is_curve=bool(curve)
+        candidates=[title], curve=located, formula=None, fit=fit, names=[], needed=True, is_curve=bool(curve)
     )
 
 
@@ -67,10 +75,25 @@ SCORES: Any = SimpleNamespace(library=None)
 def test_a_refuted_hypothesis_leaves_room_for_the_next(monkeypatch, curve_ratio, expected):
     monkeypatch.setattr("udd.discovery.acceptance.log_evidence", lambda *_a: 0.0)
     rows = {"curve": (3000.0, curve_ratio), "drag": (2700.0, (0.2, 0.1, 0.3))}
-    added = Table(rows).best(CURRENT, [trial("curve", curve=object()), trial("drag")], SCORES)
+    added = Table(rows).best(CURRENT, [trial("curve", curve="friction"), trial("drag")], SCORES)
     assert (added and added[0].candidates[0].title) == expected
 
 
 def test_all_refuted_hypotheses_add_nothing():
     rows = {"curve": (3000.0, (17.0, 11.0, 23.0)), "drag": (2700.0, (2.0, 1.5, 3.0))}
-    assert Table(rows).best(CURRENT, [trial("curve", curve=object()), trial("drag")], SCORES) is None
+    assert Table(rows).best(CURRENT, [trial("curve", curve="friction"), trial("drag")], SCORES) is None
+
+
+def test_a_refuted_formula_takes_its_curve_with_it(monkeypatch):
+    """Formulas come from the curve of the fit of all data, not from a trial's."""
+
+    class Written(Table):
+        def hypotheses(self, current: Any, trials: Any, scores: Any) -> list[Hypothesis]:
+            formulas = [trial("formula", curve=t.curve.name[0]) for t in trials if t.curve]
+            return super().hypotheses(current, [*trials, *formulas], scores)
+
+    monkeypatch.setattr("udd.discovery.acceptance.log_evidence", lambda *_a: 0.0)
+    refuted, confirmed = (17.0, 11.0, 23.0), (0.2, 0.1, 0.3)
+    rows = {"formula": (3000.0, refuted), "curve": (2900.0, refuted), "drag": (2700.0, confirmed)}
+    added = Written(rows).best(CURRENT, [trial("curve", curve="friction"), trial("drag")], SCORES)
+    assert added and added[0].candidates[0].title == "drag"

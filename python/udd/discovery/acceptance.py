@@ -225,8 +225,11 @@ class Acceptance:
             if not refuted:
                 return None
             # Without this a curve over the speed that follows a camera's errors hides a string's drag.
-            curves = [t.curve for t in refuted if t.curve is not None]
-            trials = [t for t in trials if t not in refuted and t.curve not in curves]
+            # The fit of all data has a curve of its own, so a formula is recognised by its curve's name.
+            curves = [t.curve.name for t in refuted if t.curve is not None]
+            trials = [
+                t for t in trials if t not in refuted and (t.curve is None or t.curve.name not in curves)
+            ]
         return None
 
     def _step(
