@@ -19,6 +19,7 @@ from udd.errors import UddError
 from udd.film import Defects
 from udd.measurement import read_measurement
 from udd.tracking import pictures_at, pixels
+from udd.tracking.detection.camera_motion import CameraMotion
 
 COLOURS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
 MARKS = [{"at": [0.0, 0.06], "colour": "purple"}, {"at": [0.02, -0.055], "colour": "cyan"}]
@@ -28,7 +29,7 @@ MARKS = [{"at": [0.0, 0.06], "colour": "purple"}, {"at": [0.02, -0.055], "colour
     ("defects", "said"),
     [
         ({"shake": 8.0}, "the camera moved"),
-        ({"bumps": ((1.5, 9.0, -5.0), (2.5, 0.0, 0.0))}, "the camera moved"),
+        ({"bumps": ((1.5, 9.3, -5.4), (2.5, 0.0, 0.0))}, "the camera moved"),
         ({"zooms": ((1.5, 1.25),)}, "the camera zoomed, by 25 %"),
         ({"gains": ((1.5, 0.7), (2.5, 1.0))}, "the light of the pictures changes"),
     ],
@@ -114,3 +115,17 @@ def test_small_and_dim_films_are_measured(view: Any, defects: Any, limit: float,
         m = udd.track(film.path)
     e = rms(errors(m, film))
     assert e[0] < limit and e[1] < limit and m.seen.all()
+
+
+def test_a_camera_rests_between_bumps() -> None:
+    n, middle = 60, 100 + 80j
+    shift = np.where(np.arange(n) < 30, 0, 9.3 - 5.4j) + 0.01 * np.random.default_rng(1).normal(size=n)
+    sigma = np.full((n, 3), 1e-3) * [5.0, 5.0, 0.05]
+    bumped = CameraMotion(np.ones(n, complex), shift, np.ones(n), sigma, middle)
+    assert not bumped.steady
+    assert np.array_equal(np.flatnonzero(~bumped.resting), [28, 29, 30, 31])
+    at = np.full(n, middle)
+    place = np.array([np.hypot(*cause[:, :2].T) for cause in bumped.errors(at)])
+    assert place[:, 10].max() == pytest.approx(5e-3) and place[:, 30].max() > 7e-3  # only a view that changes
+    held = CameraMotion(np.ones(n, complex), 2.0 * np.sin(np.arange(n)) + 0j, np.ones(n), sigma, middle)
+    assert not held.resting.any()

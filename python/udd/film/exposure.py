@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from udd.video.resampling import resampled
+
 from .camera import Camera
 from .defects import WOBBLE_PERIOD, Defects, hand, lit, source_of_pixels, view_of
 from .light import Picture, to_code
@@ -110,9 +112,7 @@ class Scene:
             )
         if self.defects.moves:
             view = view_of(self.camera, time, self.defects)
-            how = cv2.INTER_LANCZOS4
-            moved = cv2.warpAffine(light, view, self.camera.size, flags=how, borderMode=cv2.BORDER_REPLICATE)
-            light = np.asarray(moved, dtype=np.float32)
+            light = resampled(light, np.asarray(cv2.invertAffineTransform(view)))
         if self.defects.lights:
             light = lit(light, time, self.defects)
         return to_code(np.clip(light, 0, 1))

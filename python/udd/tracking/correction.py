@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from udd.measurement import CAMERA_COLUMNS
 from udd.video.reader import Film, Picture, Plane
+from udd.video.resampling import resampled
 from udd.video.srgb import code_of, light_of
 
 
@@ -110,21 +111,12 @@ def correction_of(
 
 
 def _steadied(planes: list[Plane], factor: complex, shift: complex) -> list[Plane]:
-    """Resample the planes; of the colours' a sample lies between two pixels of the full picture."""
-    import cv2
-
+    """Resample the planes; a sample of the colours lies between two pixels of the full picture."""
     half = 0.5 + 0.5j
     out = []
     for plane, at in zip(planes, (shift, *[(factor * half + shift - half) / 2] * 2), strict=True):
         view = np.array([[factor.real, -factor.imag, at.real], [factor.imag, factor.real, at.imag]])
-        moved = cv2.warpAffine(
-            plane,
-            view,
-            plane.shape[::-1],
-            flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-        out.append(np.asarray(moved, dtype=np.uint8))
+        out.append(np.clip(np.rint(resampled(plane, view)), 0, 255).astype(np.uint8))
     return out
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from udd.errors import outside
 from udd.tracking.correction import Correction
 from udd.video.reader import Film, Picture, Plane
+from udd.video.resampling import resampled
 
 from .frame_flags import unusable
 from .survey import Survey
@@ -31,7 +32,8 @@ AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
 PATCH = 5  # pixels about a point whose light is compared
 WINDOW = 15  # pixels
 KNOWN = 0.8  # share of the pictures whose view is known; with less, the points are not the background's
-PLACED, TURNED = 0.02, 0.06  # pixels, at the middle and at the corner: what resampling costs at least
+PLACED, TURNED = 0.007, 0.05  # pixels, at the middle and at the corner: errors that change with the view
+AROUND = 2  # frames on each side that show whether the camera rests
 UNSURE = 0.06  # pixels: a view known no better is none
 UNLIKE = 0.03  # relative difference of light that is evened out before points are followed
 ZOOMS = tuple(1.12**k for k in (1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6))  # that are tried if all else fails
@@ -84,6 +86,18 @@ class CameraMotion:
         return bool(np.nanquantile(away - SURE * unsure, 0.99) < STEADY)
 
     @property
+    def resting(self) -> NDArray[np.bool_]:
+        """Frames whose view is that of the frames around: a camera that stands still between bumps."""
+        place = np.column_stack([self.factor * self.middle + self.shift, self.factor * abs(self.middle)])
+        out = np.ones(len(place), dtype=bool)
+        for step in range(1, AROUND + 1):
+            off = np.abs(place[step:] - place[:-step]).sum(axis=1)
+            moved = off > STEADY + SURE * (self.sigma[step:, 0] + self.sigma[step:, 2] * abs(self.middle))
+            out[step:] &= ~moved
+            out[:-step] &= ~moved
+        return out
+
+    @property
     def as_bright(self) -> bool:
         """True if the light stays nearly the same."""
         return not self.is_measured.any() or bool(np.nanmax(np.abs(self.gain - 1)) < AS_BRIGHT)
@@ -123,10 +137,16 @@ class CameraMotion:
         return Correction(before.turns, before.mirrored, factor, shift, gain, full)
 
     def errors(self, at: NDArray[np.complex128]) -> list[Array]:
-        """Standard errors (n, 3) of u, v and beta of a disk at these places, one array for each cause."""
+        """Standard errors (n, 3) of u, v and beta of a disk at these places, one array for each cause.
+
+        The points are placed by the fraction of a pixel at which they lie, so that a view that changes has
+        errors beyond their scatter.
+        """
         arm = at - self.middle
         u, v, turn = np.nan_to_num(self.sigma[: len(at)]).T
-        u, v, turn = np.hypot(u, PLACED), np.hypot(v, PLACED), np.hypot(turn, TURNED / abs(self.middle))
+        moving = ~self.resting[: len(at)]
+        u, v = np.hypot(u, PLACED * moving), np.hypot(v, PLACED * moving)
+        turn = np.hypot(turn, TURNED / abs(self.middle) * moving)
         return [
             np.column_stack([u, 0 * turn, 0 * turn]),
             np.column_stack([0 * turn, v, 0 * turn]),
@@ -314,14 +334,10 @@ def _as_light(y: Plane, ratio: float) -> Plane:
 
 def _seen_from(y: Plane, factor: complex, shift: complex) -> Plane:
     """Return the picture as the camera of the first frame would have taken it."""
-    import cv2
-
     if factor == 1 and shift == 0:
         return y
     view = np.array([[factor.real, -factor.imag, shift.real], [factor.imag, factor.real, shift.imag]])
-    size, how = (y.shape[1], y.shape[0]), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    seen = cv2.warpAffine(y, view, size, flags=how, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(seen, np.uint8)
+    return np.clip(np.rint(resampled(y, view)), 0, 255).astype(np.uint8)
 
 
 def _similar(

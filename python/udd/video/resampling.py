@@ -1,0 +1,60 @@
+"""Resampling of pictures without a displacement that depends on the fraction of a pixel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+MIDWAY = (3 / 256, -25 / 256, 150 / 256, 150 / 256, -25 / 256, 3 / 256)  # value between two pixels
+
+
+def resampled(picture: NDArray[Any], view: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Resample a picture with an affine map.
+
+    OpenCV's cubic kernel displaces edges by up to 0.05 pixels, and its tables round places to 1/32 of a
+    pixel for codes of 8 bits. Here a symmetric filter enlarges the picture twice, and
+    a linear interpolation follows. The displacement is below 0.002 pixels.
+
+    Parameters
+    ----------
+    picture : ndarray (height, width) or (height, width, 3)
+        Codes or light.
+    view : ndarray (2, 3)
+        Map from a pixel (u, v, 1) of the result to its place (u, v) in the picture.
+
+    Returns
+    -------
+    ndarray of float32
+        Of the same shape; outside the picture the value of the nearest edge.
+    """
+    import cv2
+
+    size = (picture.shape[1], picture.shape[0])
+    source = np.asarray(picture, np.float32)
+    moves = view - np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    if not moves[:, :2].any() and not (moves[:, 2] % 1).any():  # whole pixels need no filter
+        return _warped(source, view, size)
+    kernel, none = np.array(MIDWAY, np.float32), np.ones(1, np.float32)
+    before = len(MIDWAY) // 2 - 1
+    large = np.empty((2 * size[1], 2 * size[0], *picture.shape[2:]), np.float32)
+    for row, column in np.ndindex(2, 2):
+        large[row::2, column::2] = cv2.sepFilter2D(
+            source,
+            -1,
+            kernel if column else none,
+            kernel if row else none,
+            anchor=(before if column else 0, before if row else 0),
+            borderType=cv2.BORDER_REPLICATE,
+        )
+    return _warped(large, 2 * view, size)
+
+
+def _warped(
+    source: NDArray[np.float32], view: NDArray[np.float64], size: tuple[int, int]
+) -> NDArray[np.float32]:
+    import cv2
+
+    how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(source, view, size, flags=how, borderMode=cv2.BORDER_REPLICATE))
