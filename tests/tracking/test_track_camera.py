@@ -129,3 +129,26 @@ def test_a_camera_rests_between_bumps() -> None:
     assert place[:, 10].max() == pytest.approx(5e-3) and place[:, 30].max() > 7e-3  # only a view that changes
     held = CameraMotion(np.ones(n, complex), 2.0 * np.sin(np.arange(n)) + 0j, np.ones(n), sigma, middle)
     assert not held.resting.any()
+
+
+def test_a_resting_camera_has_its_mean_view() -> None:
+    rng, n, middle = np.random.default_rng(2), 120, 100 + 80j
+    place = np.where(np.arange(n) < 50, 0, 9.3 - 5.4j)
+    noise = 0.01 * (rng.normal(size=n) + 1j * rng.normal(size=n))
+    sigma = np.full((n, 3), 1e-2) * [1, 1, 0.01]
+    bumped = CameraMotion(np.ones(n, complex), place + noise, np.ones(n), sigma, middle).rested()
+    assert np.ptp(bumped.shift[:50]) == 0 and np.ptp(bumped.shift[50:]) == 0
+    assert abs(bumped.shift[60] - (9.3 - 5.4j)) < 0.005
+    assert bumped.sigma[60, 0] == pytest.approx(0.01, rel=0.3)
+    sway = 2.0 * np.sin(np.arange(n) / 4) + 0j
+    hand = CameraMotion(np.ones(n, complex), sway, np.ones(n), sigma, middle)
+    assert np.allclose(hand.rested().shift, sway, atol=1e-12)
+
+
+def test_a_plain_wall_shows_a_zoom(tmp_path: Path) -> None:
+    grey = np.full((350, 276, 3), 150.0)
+    grey[:, :, 0] += np.linspace(0, 25, 276)[None] + 6 * np.sin(np.arange(350) / 9)[:, None]
+    film = shot(tmp_path / "plain.mp4", background=grey, support=0.4, defects=Defects(zooms=((1.5, 1.25),)))
+    with pytest.warns(UserWarning, match="the camera zoomed, by 25 %"):
+        m = udd.track(film.path)
+    assert m.seen.mean() > 0.96

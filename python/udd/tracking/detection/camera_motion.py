@@ -20,6 +20,7 @@ from .survey import Survey
 
 Array = NDArray[np.float64]
 POINTS = 300  # of a picture that are tried
+CONTRAST = (0.005, 0.001)  # of the strongest point that the others have; the weaker ones if the first fail
 LEARNED = 40  # pictures that show which of them belong to the background
 OFTEN = 0.35  # share of these in which such a point goes with the others
 FEWEST = 10  # points that must go the same way
@@ -34,6 +35,7 @@ WINDOW = 15  # pixels
 KNOWN = 0.8  # share of the pictures whose view is known; with less, the points are not the background's
 PLACED, TURNED = 0.007, 0.05  # pixels, at the middle and at the corner: errors that change with the view
 AROUND = 2  # frames on each side that show whether the camera rests
+REST, RESTING = 20, 0.95  # frames that a rest lasts at least, and the share of them with the same view
 UNSURE = 0.06  # pixels: a view known no better is none
 UNLIKE = 0.03  # relative difference of light that is evened out before points are followed
 ZOOMS = tuple(1.12**k for k in (1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6))  # that are tried if all else fails
@@ -86,16 +88,49 @@ class CameraMotion:
         return bool(np.nanquantile(away - SURE * unsure, 0.99) < STEADY)
 
     @property
+    def corner(self) -> NDArray[np.complex128]:
+        """Place of the middle, and half the diagonal, in each frame (n, 2) [pixels]."""
+        return np.column_stack([self.factor * self.middle + self.shift, self.factor * abs(self.middle)])
+
+    @property
+    def alike(self) -> Array:
+        """Distance up to which two views are the same in each frame [pixels]."""
+        return np.asarray(STEADY + SURE * (self.sigma[:, 0] + self.sigma[:, 2] * abs(self.middle)))
+
+    @property
     def resting(self) -> NDArray[np.bool_]:
         """Frames whose view is that of the frames around: a camera that stands still between bumps."""
-        place = np.column_stack([self.factor * self.middle + self.shift, self.factor * abs(self.middle)])
+        place = self.corner
         out = np.ones(len(place), dtype=bool)
         for step in range(1, AROUND + 1):
-            off = np.abs(place[step:] - place[:-step]).sum(axis=1)
-            moved = off > STEADY + SURE * (self.sigma[step:, 0] + self.sigma[step:, 2] * abs(self.middle))
+            moved = np.abs(place[step:] - place[:-step]).sum(axis=1) > self.alike[step:]
             out[step:] &= ~moved
             out[:-step] &= ~moved
         return out
+
+    def rested(self) -> CameraMotion:
+        """Return the motion with the mean view of each part in which the camera rests."""
+        place, sigma = self.corner, self.sigma.copy()
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], self.resting, [False]]).astype(int)))
+        for first, end in edges.reshape(-1, 2):
+            part = np.flatnonzero(self.is_measured[first:end]) + first
+            if len(part) < REST:
+                continue
+            mean = place[part].mean(axis=0)
+            same = np.abs(place - mean).sum(axis=1) < self.alike
+            if same[part].mean() < RESTING:
+                continue
+            while first > 0 and same[first - 1]:
+                first -= 1
+            while end < len(place) and same[end]:
+                end += 1
+            # the points' errors hardly change from frame to frame, so that their mean is no better
+            off = place[part] - mean
+            turn = float(np.std(np.angle(self.factor[part])))
+            sigma[first:end] = float(off[:, 0].real.std()), float(off[:, 0].imag.std()), turn
+            place[first:end] = mean
+        factor = place[:, 1] / abs(self.middle)
+        return replace(self, factor=factor, shift=place[:, 0] - factor * self.middle, sigma=sigma)
 
     @property
     def as_bright(self) -> bool:
@@ -186,13 +221,16 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     whole = [p for p in look_over.pictures if not unusable(p)]
     if not whole:
         return None
-    background = Background(whole[0].y, film.light)
-    if not background.learned(whole):
+    for contrast in CONTRAST:
+        background = Background(whole[0].y, film.light, contrast)
+        seen = background.follow(whole[::2]) if background.learned(whole) else None
+        if seen is not None and seen.is_measured.mean() >= KNOWN:
+            break
+    else:
         return None
-    seen = background.follow(whole[::2])
-    if seen.is_measured.mean() < KNOWN or (seen.steady and seen.as_bright):
+    if seen.steady and seen.as_bright:
         return None
-    moved = background.follow(film.pictures())
+    moved = background.follow(film.pictures()).rested()
     still = moved.steady and moved.as_bright
     return None if still or moved.is_measured.mean() < KNOWN else moved
 
@@ -219,14 +257,14 @@ def steadied(film: Film, look_over: Survey) -> tuple[Survey, CameraMotion | None
 class Background:
     """Points about the disk that stand still, followed from one picture into others."""
 
-    def __init__(self, first: Plane, light: Array) -> None:
+    def __init__(self, first: Plane, light: Array, contrast: float = CONTRAST[0]) -> None:
         import cv2
 
         self.light, self.first = light.astype(np.float32), first
         height, width = first.shape
         self.middle = complex(width - 1, height - 1) / 2
         spacing = max(5, round((height * width / 8000) ** 0.5))
-        corners = cv2.goodFeaturesToTrack(first, POINTS, 0.005, spacing, blockSize=5)
+        corners = cv2.goodFeaturesToTrack(first, POINTS, contrast, spacing, blockSize=5)
         self._use(np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2))
         self.view = (1 + 0j, 0j)  # the last that is known
         self.failed = 0  # pictures in a row whose view was not found
