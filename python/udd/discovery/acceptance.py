@@ -266,6 +266,25 @@ class Acceptance:
         """Return the most probable proposals, each fitted to all data at its own noise and model error."""
         terms = len(scores.library.scored) + len(scores.curves)
 
+        def whole(trial: TrialFit) -> Hypothesis | None:
+            try:
+                again = self._again(current, trial)
+                if again is None or not again.needed:
+                    return None
+                return Hypothesis(trial, again, self._at_own_noise(again.fit), log_prior(trial, terms))
+            except FitError:
+                return None
+
+        def wholes(some: Sequence[TrialFit]) -> list[Hypothesis]:
+            return [h for h in self.clock.each(whole, some) if h is not None]
+
+        result = wholes(self._leading(current, trials, terms))
+        result += wholes(self._leading(current, self._written(current, ranked(result)), terms))
+        return result + wholes(self._shortened(current, ranked(result)))
+
+    def _leading(self, current: SearchState, trials: list[TrialFit], terms: int) -> list[TrialFit]:
+        """Return the proposals that are likely by the training part, for a library with so many terms."""
+
         def first(trial: TrialFit) -> float:
             try:
                 return Hypothesis(trial, trial, eased(trial.fit), log_prior(trial, terms)).log_z
@@ -284,23 +303,7 @@ class Acceptance:
                 key=lambda t: t.fit.scatter,
             )
         likeliest = {id(trial) for trial in leading[:_COMPARED]}
-        leading = [trial for trial in trials if id(trial) in likeliest]
-
-        def whole(trial: TrialFit) -> Hypothesis | None:
-            try:
-                again = self._again(current, trial)
-                if again is None or not again.needed:
-                    return None
-                return Hypothesis(trial, again, self._at_own_noise(again.fit), log_prior(trial, terms))
-            except FitError:
-                return None
-
-        def wholes(some: Sequence[TrialFit]) -> list[Hypothesis]:
-            return [h for h in self.clock.each(whole, some) if h is not None]
-
-        result = wholes(leading)
-        result += wholes(self._written(current, ranked(result)))
-        return result + wholes(self._shortened(current, ranked(result)))
+        return [trial for trial in trials if id(trial) in likeliest]
 
     def _at_own_noise(self, fitted: Fit) -> Fit:
         """Refit at the most probable noise and model error, with all the user's free parameters."""

@@ -519,6 +519,8 @@ def most_probable(fitted: Fit) -> Fit:
     # Without this no form of a real pendulum's drag is distinguished from another.
     if (tightest.noise.factor < _least(fitted.measurements, search=True)).any():
         return tightest
+    if tightest.level > fitted.level:  # on the way the evidence rose
+        return tightest
     result = eased(tightest)
     # Without this, one form is compared at its most probable model error, another 180 nats below its own.
     if result.level < tightest.level:

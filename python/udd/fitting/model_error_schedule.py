@@ -90,10 +90,11 @@ def reduce_model_error(
         best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps, enough)
         point = best.point
         _give_up_above(goal, best)
-    far = _skip_levels(best, point, levels, enough) if problem.likeliest else None
-    if far:
-        best = _increase_model_error(far, levels)
-    for diffusion in () if far else levels:
+    start = best
+    if problem.likeliest:
+        best, point = _skip_levels(best, point, levels, enough)
+    skipped = best
+    for diffusion in levels[levels.index(best.problem.diffusion) + 1 :] if best is not start else levels:
         if _explains_little(best, goal):
             return best
         tighter = best.problem.with_model_error(diffusion)
@@ -102,6 +103,8 @@ def reduce_model_error(
             break
         best, point = result, result.point
         _give_up_above(goal, best)
+    if best is skipped and best is not start:
+        best = _increase_model_error(best, levels)
     if (
         enough
         or best.problem.has_smallest_model_error
@@ -174,21 +177,18 @@ def _stands(tighter: Fit, looser: Fit) -> bool:
 
 def _skip_levels(
     best: Fit, point: Point, levels: Sequence[tuple[float, ...]], enough: float | None = None
-) -> Fit | None:
-    """Try to skip levels up to the last one: a right model converges from one level to the next in few steps.
-
-    Return None if it does not converge; its last point is then no good start.
-    """
+) -> tuple[Fit, Point]:
+    """Skip levels as far as that goes: a right model converges from one level to the next in few steps."""
     for diffusion in levels[(len(levels) - 1) % LEAP :: LEAP]:
         try:
             tighter = best.problem.with_model_error(diffusion)
             result = provisional_fit(best.measurements, tighter, point, FEW, enough)
         except FitError:
-            return None
+            break
         if not _stands(result, best):
-            return None
+            break
         best, point = result, result.point
-    return best if levels else None
+    return best, point
 
 
 def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
