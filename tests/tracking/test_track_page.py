@@ -139,6 +139,23 @@ def test_a_refused_film_leaves_a_page_and_clicks_track_it(
     assert [k for k, flag in enumerate(m.flag) if flag.startswith("omitted")] == [10, 11, 12]
 
 
+@pytest.mark.parametrize("command", ["fit", "discover"])
+def test_a_film_refused_on_the_way_to_a_fit_leaves_its_page(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    film = shot(tmp_path / "no_red.mp4", 1.0, defects=Defects(mark_strength=(0, 0, 1, 1)))
+    assert main([command, str(film.path), "--W", "0.039", "--R", "0.08"]) == 1
+    said = capsys.readouterr().err
+    assert "no disk with marks in red" in said and "written: no_red-refused.html" in said
+    html = (tmp_path / "no_red-refused.html").read_text(encoding="utf-8")
+    data = json.loads(re.findall(r'class="clicks-data">(.*)</script>', html)[0])
+    assert data["command"] == f"udd track {film.path} --out no_red.csv --disk-radius 0.08"
+    (tmp_path / "why.html").touch()
+    assert main([command, str(tmp_path / "why.html"), "--W", "0.039"]) == 1  # a table: no page
+    assert not (tmp_path / "why-refused.html").exists()
+
+
 def test_a_wrong_option_leaves_no_page(tmp_path: Path) -> None:
     page = tmp_path / "why.html"
     assert main(["track", str(tmp_path / "none.mp4"), "--page", str(page)]) == 1

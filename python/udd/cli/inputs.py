@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import warnings
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from udd.errors import UddError
 from .option_names import OPTIONS
 from .options import add_disk, add_pendulum, disk, effects, given, names, pendulum, refuse_others
 from .output import shown_progress
+from .refused_film import explained
 from .span import add_span, part_of
 
 if TYPE_CHECKING:
@@ -225,7 +227,9 @@ def measurement_of(args: argparse.Namespace) -> tuple[Measurement, Path | None]:
     from udd.tracking import track
 
     radius = 0.08 if args.R is None else args.R
-    tracked = whole(args, lambda: track(args.file, disk_radius=radius, progress=shown_progress()))
+    sizes = {} if args.R is None else {"disk_radius": args.R}
+    with explained(args.file, sizes, shlex.join(["udd", *sys.argv[1:]])):
+        tracked = whole(args, lambda: track(args.file, disk_radius=radius, progress=shown_progress()))
     return tracked.with_meta(
         **{key: value for key, value in constants.items() if value is not None}
     ), args.file

@@ -17,6 +17,7 @@ from .export import PAGES, TABLES, OutputFile, check_ending
 from .inputs import add_partial, is_film, whole
 from .options import new, numbers
 from .output import CommandResult, shown_progress
+from .refused_film import explain
 
 if TYPE_CHECKING:
     from udd.measurement import Measurement
@@ -216,21 +217,13 @@ def _of_pictures(folder: Path) -> bool:
 
 def _explain(args: argparse.Namespace, options: dict[str, Any], error: UddError) -> Path | None:
     """Write the page of a film that the tracker refuses."""
-    from udd.report.refused_film import write_refused
-    from udd.video.reader import TrackError
-
-    if not isinstance(error, TrackError):  # such as a file that is cut off
-        return None
     page = args.page
     if page is None:  # where the table would be
         out = Path() if args.out is None else args.out
         page = (out if args.out is None or out.is_dir() else out.parent) / f"{args.file.stem}-refused.html"
     given = {"disk_radius": args.disk_radius, **options}
     commands = _command(args), _command(args, without=("pivot", "region", "fps", "leave_out", "clicks"))
-    if not write_refused(args.file, str(error), page, given=given, commands=commands):
-        return None
-    print(f"udd: written: {page}; open it to see the frames and to click what you know", file=sys.stderr)
-    return Path(page)
+    return explain(args.file, error, page, given, commands)
 
 
 def _code(m: Measurement) -> int:

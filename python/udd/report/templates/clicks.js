@@ -3,12 +3,14 @@
 export const WORDS = {
   tools: "Click on the frame",
   pivot: "Contact",
+  pivot_swing: "Pivot",
   points: "Two points",
   marks: "Marks",
   edge: "Edge of the disk",
   region: "Region",
   bob: "Bob",
-  hint_pivot: "Click the place where the wheels hold the disk, or about which the pendulum swings.",
+  hint_pivot: "Click the place where the wheels hold the disk.",
+  hint_pivot_swing: "Click the place about which the pendulum swings.",
   hint_points: "Click two points of the disk, and give their distance.",
   hint_marks: "Click the middle of each coloured mark, first the one that is above the centre at beta = 0. Then click the edge.",
   hint_edge: "Click three places on the edge, far from each other; or, once, the centre.",
@@ -64,7 +66,7 @@ export class Clicks {
     const radios = data.tools.map((name) => {
       const radio = this.make("input", { type: "radio", name: "clicks-tool", value: name, checked: name === this.tool });
       radio.addEventListener("change", () => this.choose(name));
-      return this.make("label", {}, radio, ` ${w[name]}`);
+      return this.make("label", {}, radio, ` ${this.word(name)}`);
     });
     this.hint = this.make("p", { className: "clicks-hint" });
     this.canvas = this.make("canvas", { tabIndex: 0 });
@@ -107,7 +109,12 @@ export class Clicks {
 
   choose(name) {
     this.tool = name;
-    this.hint.textContent = this.words[`hint_${name}`];
+    this.hint.textContent = this.word(`hint_${name}`);
+  }
+
+  /** The word for a tool; some have another one in the film of a pendulum. */
+  word(name) {
+    return (this.data.pendulum && this.words[`${name}_swing`]) || this.words[name];
   }
 
   /** Show the frame with this number in the list. */
