@@ -16,7 +16,7 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -86,6 +86,8 @@ _SHAPES = {
 #: Types and fields that were called otherwise in files of before.
 _BEFORE = {"Absorbed": "Confounding"}
 _RENAMED = {"Discovery": {"looks": "comparisons", "refused": "rejected"}}
+#: Fields that a file stores with the fit alone.
+_OF_FIT = {"Problem": ("measurements",)}
 _BROKEN = (
     *(AttributeError, IndexError, KeyError, OSError, OverflowError, RecursionError, TypeError, ValueError),
     *(EOFError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error),
@@ -248,7 +250,8 @@ class _Writer:
         name = type(value).__name__
         if not is_dataclass(value) or _TYPES.get(name) is not type(value):
             raise ModelError(f"a result with a {name} in it cannot be saved")
-        entries = {attribute.name: self.value(getattr(value, attribute.name)) for attribute in fields(value)}
+        names = [attribute.name for attribute in fields(value) if attribute.name not in _OF_FIT.get(name, ())]
+        entries = {attribute: self.value(getattr(value, attribute)) for attribute in names}
         # The doubts are those of the fit before its errors were widened: they cannot be computed again.
         signals = (
             {"doubts": self.value(value.doubts)} if isinstance(value, Fit) and "doubts" in vars(value) else {}
@@ -334,6 +337,8 @@ def _read(tree: Any, arrays: list[NDArray[Any]]) -> object:
         before = _RENAMED.get(kind, {})
         given = {before.get(name, name): value(x) for name, x in data["fields"].items()}
         doubts = given.pop("doubts", None)
+        if kind == "Fit":
+            given["problem"] = replace(given["problem"], measurements=given["measurements"])
         result = checked(kind, given)
         if isinstance(doubts, diagnostics.Diagnostics):
             vars(result)["doubts"] = doubts

@@ -23,9 +23,9 @@ from udd.fitting import (
     record_of,
     released,
     released_anew,
+    solve,
     started_at,
 )
-from udd.fitting.model_error_schedule import reduce_model_error
 
 
 def noisy(model: udd.Model, start: list[float], share: float) -> udd.Measurement:
@@ -207,7 +207,7 @@ def test_a_fit_goes_on_from_another_with_as_much_free() -> None:
     more = extend(released(fixed, all_free), [udd.effects.constant_torque()], [0.0])
     back = started_at(fixed, more)
     assert {f.name for f in back.problem.free} == set(more.parameters) - {"constant_torque.c"}
-    assert reduce_model_error(back.measurements, back.problem, back.point, back.problem.schedule).converged
+    assert solve(back.problem, back.problem.schedule, back.point).converged
 
 
 @pytest.fixture(scope="module")
@@ -221,16 +221,16 @@ def test_what_does_not_converge_is_given_up_beside_what_fits(astray: Fit) -> Non
     right = extend(astray, [udd.effects.load_drive(a=1.8)], [1.0])
     goal = Goal(lost=2 * right.chi2, rival=right.level)
     problem, start = astray.problem, started_at(astray, right).point
-    there = reduce_model_error(astray.measurements, problem, start, problem.schedule, goal=goal)
+    there = solve(problem, problem.schedule, start, goal=goal)
     assert there.converged and there.chi2 > goal.lost
     with pytest.raises(FitError, match="explains less than another one"):
-        reduce_model_error(astray.measurements, problem, start, problem.schedule, steps=1, goal=goal)
+        solve(problem, problem.schedule, start, steps=1, goal=goal)
 
 
 def test_where_misfits_show_the_models_faults_no_noise_is_sought_at_tighter_levels(
     astray: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = importlib.import_module("udd.fitting.fit")
+    module = importlib.import_module("udd.fitting.noise_estimation")
     asked: list[str] = []
     estimate = module._estimate_noise
 

@@ -10,7 +10,7 @@ from discovered import in_air
 from udd._util.parallel import parallel_map
 from udd.discovery import time_budget
 from udd.errors import FitError
-from udd.fitting.solve import solve
+from udd.fitting import minimise
 from udd.fitting.thinning import thinned
 from udd.report import as_text, summary_of
 
@@ -60,7 +60,7 @@ def test_no_fit_of_a_stage_starts_once_the_time_is_up():
     clock = time_budget.Clock(60.0, str)
 
     def again(_piece: int) -> udd.fitting.Fit:
-        return solve(fitted.measurements, fitted.problem, fitted.point)
+        return minimise(fitted.problem, fitted.point)
 
     with clock.limited():
         assert [fit.chi2 for fit in parallel_map(again, range(2))] == [again(0).chi2] * 2

@@ -13,11 +13,19 @@ from scipy.optimize import least_squares
 import simulated
 import udd
 from udd.errors import FitError
-from udd.fitting import as_stated, eased, fit_record, model_error_schedule, record_of, widened
+from udd.fitting import (
+    SolveError,
+    as_stated,
+    eased,
+    fit_record,
+    minimise,
+    model_error_schedule,
+    record_of,
+    widened,
+)
 from udd.fitting.estimator_input import FilmParameters
-from udd.fitting.fit import _afresh
+from udd.fitting.noise_estimation import _afresh
 from udd.fitting.parameters import Free
-from udd.fitting.solve import SolveError, solve
 
 
 @pytest.fixture(scope="module")
@@ -273,7 +281,7 @@ def test_what_a_solve_left_counts_only_where_it_was_left():
         sets = tuple(
             FilmParameters([*v, 0.0][: len(problem.models[0].parameters)], c, k) for v, c, k in left.sets
         )
-        ends = [solve((measured,), problem, replace(p, sets=sets), 1) for p in (left, bare)]
+        ends = [minimise(problem, replace(p, sets=sets), 1) for p in (left, bare)]
         assert ends[0].chi2 == ends[1].chi2
         assert ends[0].parameters == ends[1].parameters
 
@@ -288,5 +296,5 @@ def test_a_looser_fit_whose_shape_leaves_its_range_is_no_candidate(monkeypatch):
     def leaves(*_args, **_options):
         raise SolveError("the fit reached parameters that are invalid for the model")
 
-    monkeypatch.setattr(model_error_schedule, "solve", leaves)
+    monkeypatch.setattr(model_error_schedule, "minimise", leaves)
     assert eased(tight).parameters == tight.parameters

@@ -132,13 +132,13 @@ def test_wrong_units_are_refused_on_the_last_part_of_a_record(monkeypatch: pytes
     measured = udd.Measurement(t, {"theta": theta + 1e-3 * np.random.default_rng(1).standard_normal(len(t))})
     lengths = []
 
-    def noted(free, record, measurements, models, *more):  # type: ignore[no-untyped-def]
-        lengths.append((models[0].parameters["length"], len(record.t)))
-        return loosest(free, record, measurements, models, *more)
+    def noted(problem, start):  # type: ignore[no-untyped-def]
+        lengths.append((problem.models[0].parameters["length"], len(problem.record.t)))
+        return solved(problem, start)
 
-    module = sys.modules["udd.fitting.fit"]
-    loosest = module._loosest
-    monkeypatch.setattr(module, "_loosest", noted)
+    module = sys.modules["udd.fitting.units"]
+    solved = module.solve_with_noise
+    monkeypatch.setattr(module, "solve_with_noise", noted)
     _found, said = fitted(measured, udd.Pendulum(0.8, k0=0.02))
     assert "the fit continues with the given units" in said
     # Lengths of another decade are fitted to 100 frames alone, and what swings between frames not at all.

@@ -17,10 +17,8 @@ from udd.discovery.symbolic.expressions import softened, write
 from udd.discovery.symbolic.formulas import Formula
 from udd.effects import Effect
 from udd.errors import FitError
-from udd.fitting import Fit, Goal, widened
-from udd.fitting.model_error_schedule import ANY, FEW, ROUGH, STEPS, reduce_model_error
-from udd.fitting.parameters import Free
-from udd.fitting.solve import done, solve
+from udd.fitting import Fit, Goal, minimise, solve, widened
+from udd.fitting.model_error_schedule import ANY, FEW, ROUGH, STEPS
 
 Array = NDArray[np.float64]
 
@@ -128,7 +126,7 @@ def fit_curve(fit: Fit, curve: Curve, name: str = "curve", most: float = math.in
         here, slow = (here, 0.0) if tighter is None else (tighter, _SLOW)
     # The curve of the model; the next move would be within the last one.
     curve, at, score = replace(here.curve, coefficients=here.at), here.at, here.curve.score
-    fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, done(here.fit))
+    fitted = _solved(fit, curve, name, here.fit, here.fit.level, STEPS, here.fit.smallest_decrease)
     gain = float(score.gradient @ at - at @ score.information @ at / 2)
     cost = gain - curve.evidence
     if not settled:  # while the curve still moves, its gain here does not determine its cost
@@ -191,7 +189,7 @@ def _solved(
     """Fit the model with the curve fixed, at a level of model error, from the end of another fit."""
     problem, point = widened(fit, [curve_effect(curve, name)], start)
     problem = problem.with_model_error(problem.schedule[level])
-    return solve(fit.measurements, problem, point, steps, decrease)
+    return minimise(problem, point, steps, decrease)
 
 
 def formula_effect(curve: Curve, formula: Formula, name: str = "formula") -> Effect:
@@ -227,11 +225,6 @@ def fit_formula(
         The formula cannot be added to the model, the fit fails, or does not reach its goal.
     """
     problem, point = widened(fit, [formula_effect(curve, formula, name)])
-    order = list(problem.models[0].parameters)
-    names = [f"{name}.{p}" for p in formula.parameters]
-    more = tuple(Free(n, "model", order.index(n), 0.0, np.inf) for n in names)
-    problem = replace(problem, free=problem.free + more)
+    problem = problem.freeing({f"{name}.{p}": (0.0, np.inf) for p in formula.parameters})
     # If its constants diverge, or are collinear, the fit has no end.
-    return reduce_model_error(
-        fit.measurements, problem, point, problem.schedule[1:], steps=FEW, goal=goal or ANY
-    )
+    return solve(problem, problem.schedule[1:], point, steps=FEW, goal=goal or ANY)

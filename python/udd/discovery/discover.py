@@ -27,6 +27,7 @@ from udd.errors import FitError
 from udd.fitting import (
     UNEXPLAINED,
     Fit,
+    SolveError,
     as_stated,
     checked_units,
     continuous,
@@ -38,7 +39,6 @@ from udd.fitting import (
     refit,
 )
 from udd.fitting.record import Record
-from udd.fitting.solve import SolveError
 from udd.fitting.thinning import Thinned, thinned
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement

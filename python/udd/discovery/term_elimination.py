@@ -14,12 +14,11 @@ from udd._util import chi_squared
 from udd._util.arguments import checked_arguments
 from udd._util.progress import Progress, with_status
 from udd.errors import FitError
-from udd.fitting import Fit, at_level, continuous, fit_record, record_of
+from udd.fitting import Fit, SolveError, at_level, continuous, fit_record, minimise, record_of, solve
 from udd.fitting.estimator_input import FilmParameters
-from udd.fitting.model_error_schedule import reduce_model_error
 from udd.fitting.parameters import Free
+from udd.fitting.problem import Point
 from udd.fitting.record import Record
-from udd.fitting.solve import SolveError, solve
 from udd.measurement import Measurement
 from udd.models import Model
 
@@ -276,7 +275,7 @@ class _Pruning:
 
     def _tightened(self, fitted: Fit) -> Fit:
         schedule = fitted.problem.schedule[fitted.level :]
-        return reduce_model_error(fitted.measurements, fitted.problem, fitted.point, schedule)
+        return solve(fitted.problem, schedule, fitted.point)
 
     def _without(self, current: Fit, gently: bool = False, kept: str | None = None) -> Fit:
         """Remove terms as long as that decreases the criterion, several at a time while it does by far.
@@ -347,12 +346,7 @@ class _Pruning:
             sets.append(FilmParameters(values, camera, clock))
         problem = replace(fitted.problem, free=free)
         try:
-            return solve(
-                fitted.measurements,
-                problem,
-                replace(fitted.point.without_cache(), sets=tuple(sets)),
-                iterations,
-            )
+            return minimise(problem, Point(fitted.point.states, tuple(sets)), iterations)
         except FitError:
             return None
 

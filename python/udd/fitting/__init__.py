@@ -1,42 +1,43 @@
-"""Estimate a model's parameters and states from measured motion."""
+"""Estimate a model's parameters and states from measured motion.
+
+The files, in the order of a fit: `record` prepares measurements; `problem` adds a model, free parameters and
+the start; `minimum` calls the core once; `model_error_schedule` repeats that with smaller model errors; and
+`noise_estimation` estimates the noise on the way. The result is a `Fit`; `refits` continue from its end.
+"""
 
 from __future__ import annotations
 
 from .continuous import continuous
-from .fit import (
-    UNEXPLAINED,
+from .fit import fit, fit_record, options_of
+from .fit_result import Fit, minimise
+from .minimum import SolveError
+from .model_error_schedule import Goal, far_off, solve
+from .prediction import filtered, predicted
+from .record import Record, record_of
+from .refits import (
     as_stated,
-    checked_units,
-    extend,
-    fit,
-    fit_record,
-    most_probable,
-    options_of,
-    ran_away,
-    refit,
-    released,
-    released_anew,
-    started_at,
-    widened,
-)
-from .model_error_schedule import (
-    Goal,
     at_level,
     beyond_schedule,
     eased,
-    far_off,
+    extend,
+    most_probable,
+    refit,
+    released,
+    released_anew,
     smoothed_states,
+    started_at,
+    widened,
     with_larger_model_error,
+    within,
 )
-from .problem import Fit
-from .record import Record, record_of
-from .solve import filtered, frame_costs, predicted, within
+from .units import UNEXPLAINED, checked_units, ran_away
 
 __all__ = [
     "UNEXPLAINED",
     "Fit",
     "Goal",
     "Record",
+    "SolveError",
     "as_stated",
     "at_level",
     "beyond_schedule",
@@ -48,7 +49,7 @@ __all__ = [
     "filtered",
     "fit",
     "fit_record",
-    "frame_costs",
+    "minimise",
     "most_probable",
     "options_of",
     "predicted",
@@ -58,6 +59,7 @@ __all__ = [
     "released",
     "released_anew",
     "smoothed_states",
+    "solve",
     "started_at",
     "widened",
     "with_larger_model_error",

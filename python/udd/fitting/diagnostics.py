@@ -11,12 +11,12 @@ from udd import _core
 from udd._util.one_line import OneLine
 from udd._util.small_units import small_unit
 
+from .innovations import innovations
 from .input_noise import LEVEL_RATIO, NoisyInput, diffusion_by_noise, noisy_inputs
-from .parameters import Free
 from .sensor import geometry_limits, is_film, lattice, moving, repeats
 
 if TYPE_CHECKING:
-    from .problem import Fit
+    from .fit_result import Fit
 
 _LAGS = 20  # of the innovations' autocorrelation
 #: Probability for white noise below which innovations are not white. With a right model, lenses and outliers
@@ -265,7 +265,7 @@ def doubts(fit: Fit) -> Diagnostics:
     """Diagnose a fit: model error, innovations, runaway parameters, noise, units."""
     last = len(fit.problem.schedule) - 1
     noisy = noisy_inputs(fit.measurements, fit.model.inputs)
-    missed, white = _missed(fit), _white(fit)
+    missed, end = _missed(fit), moving(fit.measurement)
     tight = fit.level >= last - _NEARLY
     by_inputs = [] if tight else _by_inputs(fit, missed, noisy)
     tight = tight or bool(by_inputs)
@@ -273,50 +273,42 @@ def doubts(fit: Fit) -> Diagnostics:
     # many standard errors as the square root of the number of independent errors that were assumed.
     factor = float(np.sqrt(max(int(fit.record.linked.sum()), 1))) if not tight else 1.0
     return Diagnostics(
-        missed,
-        tight,
-        white,
-        ran_off(fit),
-        factor,
-        readings(fit),
-        _rests(fit),
-        is_film(fit.measurement),
-        noisy,
-        by_inputs,
-        fit.unit_doubt,
-        next((str(m.meta["clock"]) for m in fit.measurements if "clock" in m.meta), None),
+        missed=missed,
+        tight=tight,
+        white=_white(fit),
+        ran_off=ran_off(fit),
+        factor=factor,
+        sensor=readings(fit),
+        rests=float(fit.measurement.t[end - 1]) if end < len(fit.measurement) else None,
+        filmed=is_film(fit.measurement),
+        inputs=noisy,
+        by_inputs=by_inputs,
+        unit=fit.unit_doubt,
+        clock=next((str(m.meta["clock"]) for m in fit.measurements if "clock" in m.meta), None),
     )
-
-
-def _rests(fit: Fit) -> float | None:
-    end = moving(fit.measurement)
-    return float(fit.measurement.t[end - 1]) if end < len(fit.measurement) else None
 
 
 def readings(fit: Fit) -> list[Reading]:
     """Return the noise of each observed channel, and the steps in which it was read."""
     known_units = fit.model.profile.sensor.units
-    sd = fit.noise.sd(fit.record, fit.blurring)
+    sd = fit.noise_sd
     limited = geometry_limits(fit.model.profile.sensor, fit.measurement)
     result = []
     for k, name in enumerate(fit.channels):
         observed = fit.record.observed[:, k]
-        if observed.any():
-            first = observed & (fit.record.film == 0)
-            step = lattice(fit.record.seen[first, k])
-            # Repeated readings share the error of their step: the others show the noise of a single frame.
-            alone = observed & (repeats(fit.record.seen[:, k], step) == 1) if step else observed
-            noise = float(np.median(sd[alone, k]) if alone.any() else sd[observed, k].min())
-            memory = float(fit.noise.memory[k])
-            # A misfit is smaller than the error, because the states follow the frames.
-            errors = (np.square(fit.misfit[observed, k]) + fit.misfit_variance[observed, k]) / np.square(
-                sd[observed, k]
-            )
-            shown = noise * float(np.sqrt(np.average(errors, weights=fit.noise.weight[observed])))
-            trusted = not limited or shown > _BETTER * noise
-            result.append(
-                Reading(name, known_units[k] if known_units else "", noise, shown, step, memory, trusted)
-            )
+        if not observed.any():
+            continue
+        step = lattice(fit.record.seen[observed & (fit.record.film == 0), k])
+        # Repeated readings share the error of their step: the others show the noise of a single frame.
+        alone = observed & (repeats(fit.record.seen[:, k], step) == 1) if step else observed
+        noise = float(np.median(sd[alone, k]) if alone.any() else sd[observed, k].min())
+        # A misfit is smaller than the error, because the states follow the frames.
+        squares = np.square(fit.misfit[observed, k]) + fit.misfit_variance[observed, k]
+        errors = squares / np.square(sd[observed, k])
+        shown = noise * float(np.sqrt(np.average(errors, weights=fit.noise.weight[observed])))
+        trusted = not limited or shown > _BETTER * noise
+        unit, memory = known_units[k] if known_units else "", float(fit.noise.memory[k])
+        result.append(Reading(name, unit, noise, shown, step, memory, trusted))
     return result
 
 
@@ -348,24 +340,18 @@ def _by_inputs(fit: Fit, missed: list[ModelError], noisy: list[NoisyInput]) -> l
 
 def _missed(fit: Fit) -> list[ModelError]:
     step = float(np.median(np.diff(fit.record.t)))
-    model = fit.model
-    order, profile_units = list(model.state_names), model.profile.fit.equations
-    names = (
-        {name: "" for name in order if name not in model.kinematic}
-        if profile_units is None
-        else profile_units
-    )
-    now, best = fit.problem.diffusion, fit.problem.schedule[-1]
+    model, names = fit.model, fit.model.profile.fit.equations
+    if names is None:
+        names = {name: "" for name in model.state_names if name not in model.kinematic}
     root = np.sqrt(step)
-    return [
-        ModelError(name, unit, now[order.index(name)] / root, best[order.index(name)] / root)
-        for name, unit in names.items()
-    ]
+    pairs = zip(fit.problem.diffusion, fit.problem.schedule[-1], strict=True)
+    needed = {
+        name: (q / root, right / root) for name, (q, right) in zip(model.state_names, pairs, strict=True)
+    }
+    return [ModelError(name, unit, *needed[name]) for name, unit in names.items()]
 
 
 def _white(fit: Fit) -> dict[str, float]:
-    from .innovations import innovations
-
     if len(fit.record.t) < _LEAST:
         return {}
     result = innovations(fit)
@@ -387,14 +373,13 @@ def ran_off(fit: Fit) -> list[RunawayParameter]:
     """Return the parameters outside their priors, and negative friction coefficients."""
     result, unit_of = [], units(fit)
     for free in fit.problem.free:
-        value = fit.parameters[free.name]
-        unit, error = unit_of[free.name], fit.errors[free.name]
+        value, error = fit.parameters[free.name], fit.errors[free.name]
+        is_friction = free.role == "model" and free.name.partition("[")[0] in ("k0", "k1")
         if np.isfinite(free.sd) and abs(value - free.mean) > _OFF * free.sd:
-            result.append(RunawayParameter(free.name, unit, value, free.mean, free.sd, error))
-        elif _is_friction(free) and value < -_OFF * error:
-            result.append(RunawayParameter(free.name, unit, value, free.mean, np.inf, error))
+            sd = free.sd
+        elif is_friction and value < -_OFF * error:
+            sd = np.inf
+        else:
+            continue
+        result.append(RunawayParameter(free.name, unit_of[free.name], value, free.mean, sd, error))
     return result
-
-
-def _is_friction(free: Free) -> bool:
-    return free.role == "model" and free.name.partition("[")[0] in ("k0", "k1")

@@ -34,16 +34,10 @@ class Observations:
 
     Attributes
     ----------
-    t : ndarray (n,)
-        Times of the frames [s].
-    seen : ndarray (n, m)
-        Observations. They are 0 if not observed.
+    t, seen, linked, film : ndarray
+        As in :class:`.record.Record`.
     information : ndarray (n, m, m)
         Inverse of each frame's noise covariance. It is zero if nothing was observed.
-    linked : ndarray of bool (n - 1,)
-        True if the model leads from a frame to the next.
-    film : ndarray of int (n,)
-        Number of the measurement that a frame belongs to.
     autocorrelation : list of float (m,)
         Lag-1 autocorrelation of each channel's noise.
     """

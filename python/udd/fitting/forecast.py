@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
@@ -21,7 +22,7 @@ from udd._util.keywords import renamed
 from udd._util.memory import require_memory
 from udd._util.progress import thread_count
 from udd._util.random_generator import Rng, generator
-from udd._util.validation import array, number
+from udd._util.validation import array, number, whole
 from udd.chaos.largest_exponent import lyapunov
 from udd.errors import FitError, IntegrationError, ModelError
 from udd.measurement import Measurement
@@ -32,12 +33,13 @@ from udd.simulation.batch import Batch
 from udd.simulation.outcomes import FINISHED
 from udd.simulation.trajectory import method_for
 
-from . import Fit, Record, predicted, record_of
 from .continuous import continuous
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .fit import fit
+from .fit_result import Fit
 from .formula_models import driven
-from .parameters import Free
+from .prediction import predicted
+from .record import Record, record_of
 from .time_scale import motion_time_scale
 
 __all__ = ["Forecast", "forecast"]
@@ -250,7 +252,10 @@ def forecast(
             f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r:.80}"
         )
     measurement = continuous(measurement, model.model if isinstance(model, Fit) else model)
-    checked = _options(members, level)
+    members, tail = whole("members", members, 2), (1.0 - number("level", level, above=0.0)) / 2.0
+    if tail <= 0.0:
+        raise ModelError(f"level must be below 1, not {level:g}")
+    require_memory(f"{members} members", members, itemsize=10_000)
     random = generator(rng)
     if t is not None:
         _times(t, _STEP)
@@ -261,18 +266,14 @@ def forecast(
             raise FitError(
                 f"start is {start:g} s, but the record ends at {measurement.t[-1]:g} s; start earlier"
             )
-    if window is not None:
-        number("window", window, above=0.0)
-    if error is not None:
-        number("error", error, above=0.0)
-    if isinstance(model, Fit):
-        fitted = model
-        if fitted.measurement.kind != measurement.kind:
-            raise FitError(
-                f"the fit is that of a {fitted.measurement.kind}, the measurement of a {measurement.kind}"
-            )
-    else:
-        fitted = fit(past, model)
+    for name, option in (("window", window), ("error", error)):
+        if option is not None:
+            number(name, option, above=0.0)
+    fitted = model if isinstance(model, Fit) else fit(past, model)
+    if fitted.measurement.kind != measurement.kind:
+        raise FitError(
+            f"the fit is that of a {fitted.measurement.kind}, the measurement of a {measurement.kind}"
+        )
     # The columns of a measurement do not say which unit of time a user's own model needs.
     profile, unit = fitted.model.profile, motion_time_scale(fitted)
     large = profile.fit.valid_error if error is None else float(error)
@@ -286,7 +287,7 @@ def forecast(
     film_model = fitted.models[film]
     if isinstance(film_model, FormulaModel) and film_model.inputs:
         (film_model,) = driven((film_model,), (measurement,), origin)
-    models, cameras, states = _starts(fitted, film_model, film, part, checked, scale, random)
+    models, cameras, states = _starts(fitted, film_model, film, part, members, scale, random)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
     clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
@@ -295,11 +296,11 @@ def forecast(
     seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
     spread = np.nanstd(past.values, axis=0)
 
-    low, median, high = _quantiles(seen, checked[1])
+    shares = [tail, 0.5, 1.0 - tail]
+    low, median, high = _quantiles(seen, shares)
     valid = [_parted(times, _size(member - median, profile.sensor, spread), large) for member in seen]
-    tail = (1.0 - checked[1]) / 2.0
     # A member that never diverges counts as later than all that do.
-    shortest, valid_time, longest = np.quantile(valid, [tail, 0.5, 1.0 - tail], method="higher")
+    shortest, valid_time, longest = np.quantile(valid, shares, method="higher")
     clock = t_model + origin
     return Forecast(
         t=clock,
@@ -308,7 +309,7 @@ def forecast(
         high=high,
         members=seen,
         names=measurement.names,
-        level=checked[1],
+        level=float(level),
         error=large,
         valid_time=float(valid_time),
         valid_low=float(shortest),
@@ -330,16 +331,6 @@ def _times(t: ArrayLike, step: float) -> Array:
     if wanted.ndim != 1 or not wanted.size or wanted[0] < 0 or not (np.diff(wanted) > 0).all():
         raise ModelError("t must be a time ahead in s, or a list of such times, increasing from 0")
     return wanted if wanted[0] == 0 else np.concatenate([[0.0], wanted])
-
-
-def _options(members: int, level: float) -> tuple[int, float]:
-    share = number("level", level, above=0.0)
-    if share >= 1:
-        raise ModelError(f"level must be below 1, not {share:g}")
-    if isinstance(members, bool) or not isinstance(members, (int, np.integer)) or members < 2:
-        raise ModelError(f"members must be a whole number, at least 2, not {members!r}")
-    require_memory(f"{members} members", int(members), itemsize=10_000)
-    return int(members), share
 
 
 def _film(fitted: Fit, measurement: Measurement, film: int | None) -> int:
@@ -387,19 +378,19 @@ def _starts(
     film_model: Model,
     film: int,
     part: Record,
-    checked: tuple[int, float],
+    members: int,
     scale: float,
     rng: np.random.Generator,
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Draw every member's model, camera and state at the window's end."""
     seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
-    (_model, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
-    window = [(0, len(part.t) - 1)]
+    (_values, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
     models, cameras, states = [], [], []
     free = [f for f in fitted.problem.free if f.film in (None, film)]
+    names = {f.name: list(film_model.parameters)[f.index] for f in free if f.role == "model"}
     draws = _draws(fitted, scale, rng)
-    for _ in range(checked[0]):
-        model, draw = _drawn(film_model, [f for f in free if f.role == "model"], draws)
+    for _ in range(members):
+        model, draw = _valid(film_model, names, draws)
         camera = list(camera_of_fit)
         for parameter in free:
             if parameter.role == "camera":
@@ -407,7 +398,7 @@ def _starts(
         try:
             films = [FilmParameters(list(model.parameters.values()), camera, clock)]
             fixed = EstimatorInput(model, seen, part.states, films, (), diffusion)
-            _first, last, spread = _core.filter(fixed, window)
+            _first, last, spread = _core.filter(fixed, [(0, len(part.t) - 1)])
         except ValueError as error:
             raise FitError(f"the state cannot be filtered from the window: {error}") from error
         models.append(model)
@@ -416,18 +407,13 @@ def _starts(
     return models, cameras, np.array(states)
 
 
-def _drawn(
-    film_model: Model, free: Sequence[Free], draws: Iterator[Mapping[str, float]]
+def _valid(
+    film_model: Model, names: Mapping[str, str], draws: Iterator[Mapping[str, float]]
 ) -> tuple[Model, Mapping[str, float]]:
-    """Return a model from the next draw that is valid for it."""
-    order = list(film_model.parameters)
+    """Return a model from the next draw that is valid for it; `names` are those of its parameters."""
     for draw in itertools.islice(draws, _TRIES):
-        try:
-            return film_model.with_parameters(
-                {order[parameter.index]: draw[parameter.name] for parameter in free}
-            ), draw
-        except ModelError:
-            continue
+        with contextlib.suppress(ModelError):
+            return film_model.with_parameters({names[name]: draw[name] for name in names}), draw
     raise FitError(
         "the fitted parameters are too uncertain for a forecast; use a longer record or fix some of them"
     )
@@ -435,16 +421,15 @@ def _drawn(
 
 def _draws(fitted: Fit, scale: float, rng: np.random.Generator) -> Iterator[Mapping[str, float]]:
     """Draw parameters from the fit's covariance; the clock's error is fixed."""
-    names = list(fitted.parameters)
-    mean = np.array([fitted.parameters[name] for name in names])
+    mean = np.array(list(fitted.parameters.values()))
     covariance = fitted.covariance / fitted.widened**2  # the kicks represent the model error
-    fixed = [k for k, free in enumerate(fitted.problem.free) if free.role == "clock"]
-    for k in fixed:
-        column = covariance[:, k]
-        covariance = covariance - np.outer(column, column) / column[k]
-        covariance[k, :] = covariance[:, k] = 0.0
+    for k, free in enumerate(fitted.problem.free):
+        if free.role == "clock":
+            column = covariance[:, k]
+            covariance = covariance - np.outer(column, column) / column[k]
+            covariance[k, :] = covariance[:, k] = 0.0
     while True:
-        yield dict(zip(names, (mean + scale * _normal(covariance, rng)).tolist(), strict=True))
+        yield dict(zip(fitted.parameters, (mean + scale * _normal(covariance, rng)).tolist(), strict=True))
 
 
 def _normal(covariance: Array, rng: np.random.Generator) -> Array:
@@ -511,14 +496,13 @@ def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: 
     return np.array(seen)
 
 
-def _quantiles(seen: Array, level: float) -> tuple[Array, Array, Array]:
-    """Return lower edge, median and upper edge of the band, while half of the members still run."""
-    tail = (1.0 - level) / 2.0
+def _quantiles(seen: Array, shares: list[float]) -> Array:
+    """Return quantiles of the members, (3, k, m), while half of them still run."""
     there = np.isfinite(seen).all(axis=2).mean(axis=0) > 0.5
     result = np.full((3, *seen.shape[1:]), np.nan)
     if there.any():
-        result[:, there] = np.nanquantile(seen[:, there], [tail, 0.5, 1.0 - tail], axis=0)
-    return result[0], result[1], result[2]
+        result[:, there] = np.nanquantile(seen[:, there], shares, axis=0)
+    return result
 
 
 def _size(difference: Array, sensor: SensorProfile, spread: Array) -> Array:

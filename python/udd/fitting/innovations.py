@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 from udd import _core
 from udd._util import chi_squared
 
-from .problem import Fit
+if TYPE_CHECKING:
+    from .fit_result import Fit
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .record import Record
+from .sensor import noise_by_differences
 
 __all__ = ["LEVEL_RATIO", "NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
 
@@ -59,14 +59,8 @@ def noise_of(signal: InputSignal) -> float:
     """
     if len(signal) < _SHORTEST or signal.hold == "zero" or len(np.unique(signal.values)) < _LEVELS:
         return 0.0
-    lower, higher = (noise_by_differences(signal.values, order) for order in _ORDERS)
+    lower, higher = (float(noise_by_differences(signal.values, order)) for order in _ORDERS)
     return higher if higher > _WHITE * lower else 0.0
-
-
-def noise_by_differences(values: Array, order: int) -> float:
-    """Compute the standard deviation of white noise with differences of this order as large as these."""
-    size = np.median(np.abs(np.diff(values, order))) / 0.6745
-    return float(size / np.sqrt(math.comb(2 * order, order)))
 
 
 def noisy_inputs(measurements: tuple[Measurement, ...], names: tuple[str, ...]) -> list[NoisyInput]:

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from udd.errors import FitError
-from udd.measurement import Measurement
 
+from .fit_result import Fit, minimise
+from .minimum import DONE, SolveError
 from .noise import estimated, noise_autocorrelation
-from .problem import Fit, Point, Problem
-from .record import Record
-from .solve import DONE, SolveError, done, solve
+from .problem import Point, Problem
 
 #: Maximum of steps at one level: a right model takes three to seven, or more if its law has kinks.
 STEPS = 30
@@ -56,22 +55,33 @@ class Goal:
     lost: float = np.inf
     rival: int = 0
 
+    def require(self, best: Fit) -> None:
+        """Raise a FitError for a fit that is already above the goal."""
+        above = best.level <= self.level and best.chi2 > self.chi2
+        lost = best.level <= self.rival and best.chi2 > self.lost and not best.converged
+        if above or lost:
+            raise FitError("the model explains less than another one with the same model error")
+
+    def explains_little(self, best: Fit) -> bool:
+        """Return True if a fit has reached the goal's level and is far from explaining the data."""
+        return self != ANY and best.level >= self.level and best.converged and far_off(best)
+
 
 #: No target: every fit is useful.
 ANY = Goal()
 
 
-def reduce_model_error(
-    measurements: tuple[Measurement, ...],
+def solve(
     problem: Problem,
-    point: Point,
     schedule: Sequence[tuple[float, ...]],
+    start: Point,
+    *,
     best: Fit | None = None,
     steps: int = STEPS,
     goal: Goal = ANY,
     enough: float | None = None,
 ) -> Fit:
-    """Minimise with a decreasing model-error variance: solve, reduce it, solve again from there.
+    """Minimise with a decreasing model-error variance: minimise, reduce it, minimise again from there.
 
     It ends at the level where the minimiser no longer converges, which a wrong model reaches early. If the
     problem asks for the most probable level, it ends where the evidence falls. `best` is a fit at a larger
@@ -87,46 +97,27 @@ def reduce_model_error(
     if best is None:
         if not levels:
             raise FitError("the fit has no level to solve at")
-        best = provisional_fit(measurements, problem.with_model_error(levels.pop(0)), point, steps, enough)
-        point = best.point
-        _give_up_above(goal, best)
-    start = best
+        best = provisional_fit(problem.with_model_error(levels.pop(0)), start, steps, enough)
+        start = best.point
+        goal.require(best)
+    first = best
     if problem.likeliest:
-        best, point = _skip_levels(best, point, levels, enough)
+        best, start = _skip_levels(best, start, levels, enough)
     skipped = best
-    for diffusion in levels[levels.index(best.problem.diffusion) + 1 :] if best is not start else levels:
-        if _explains_little(best, goal):
+    for diffusion in levels if best is first else levels[levels.index(best.problem.diffusion) + 1 :]:
+        if goal.explains_little(best):
             return best
-        tighter = best.problem.with_model_error(diffusion)
-        result = provisional_fit(measurements, tighter, point, steps, enough)
-        if not _stands(result, best):
+        tighter = provisional_fit(best.problem.with_model_error(diffusion), start, steps, enough)
+        if not _stands(tighter, best):
             break
-        best, point = result, result.point
-        _give_up_above(goal, best)
-    if best is skipped and best is not start:
-        best = _increase_model_error(best, levels)
-    if (
-        enough
-        or best.problem.has_smallest_model_error
-        or best.level < goal.level
-        or _explains_little(best, goal)
-    ):
+        best, start = tighter, tighter.point
+        goal.require(best)
+    if best is skipped and best is not first:
+        best = increase_model_error(best, levels)
+    provisional = not best.problem.has_smallest_model_error and best.level >= goal.level
+    if enough or not provisional or goal.explains_little(best):
         return best
     return _settled(best, schedule, steps)
-
-
-def _give_up_above(goal: Goal, best: Fit) -> None:
-    """Abandon a fit that is already above its goal."""
-    above = best.level <= goal.level and best.chi2 > goal.chi2
-    lost = best.level <= goal.rival and best.chi2 > goal.lost and not best.converged
-    if above or lost:
-        raise FitError("the model explains less than another one with the same model error")
-
-
-def _explains_little(best: Fit, goal: Goal) -> bool:
-    """Return True if a fit has reached its goal's level and is far from explaining the data."""
-    tight = goal != ANY and best.level >= goal.level
-    return tight and best.converged and far_off(best)
 
 
 def far_off(fitted: Fit) -> bool:
@@ -134,20 +125,11 @@ def far_off(fitted: Fit) -> bool:
     return fitted.scatter > _FAR_OFF
 
 
-def beyond_schedule(fitted: Fit) -> bool:
-    """Return True if a fit has more model error than the largest of its schedule."""
-    return fitted.problem.diffusion not in fitted.problem.schedule
-
-
 def provisional_fit(
-    measurements: tuple[Measurement, ...],
-    problem: Problem,
-    point: Point,
-    iterations: int = STEPS,
-    enough: float | None = None,
+    problem: Problem, point: Point, iterations: int = STEPS, enough: float | None = None
 ) -> Fit:
     """Fit on the way to a smaller model error; with noise autocorrelation if its likelihood matters."""
-    result = _nearly(solve(measurements, problem, point, iterations, enough or _enough(problem)), iterations)
+    result = _nearly(minimise(problem, point, iterations, enough or _enough(problem)), iterations)
     return with_noise_correlation(result, enough) if problem.likeliest and result.converged else result
 
 
@@ -160,7 +142,7 @@ def _nearly(fitted: Fit, steps: int) -> Fit:
     """
     if fitted.converged or fitted.problem.likeliest or steps < STEPS:
         return fitted
-    continued = solve(fitted.measurements, fitted.problem, fitted.point, _LITTLE, ROUGH)
+    continued = minimise(fitted.problem, fitted.point, _LITTLE, ROUGH)
     return continued if continued.converged else fitted
 
 
@@ -182,7 +164,7 @@ def _skip_levels(
     for diffusion in levels[(len(levels) - 1) % LEAP :: LEAP]:
         try:
             tighter = best.problem.with_model_error(diffusion)
-            result = provisional_fit(best.measurements, tighter, point, FEW, enough)
+            result = provisional_fit(tighter, point, FEW, enough)
         except FitError:
             break
         if not _stands(result, best):
@@ -191,7 +173,7 @@ def _skip_levels(
     return best, point
 
 
-def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
+def increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fit:
     """Increase the model error again, level by level, as long as the evidence rises.
 
     A level at which a parameter leaves its range is the end.
@@ -199,7 +181,7 @@ def _increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> F
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
         problem = fitted.problem.with_model_error(diffusion)
         try:
-            looser = solve(fitted.measurements, problem, fitted.point, decrease=ROUGH)
+            looser = minimise(problem, fitted.point, decrease=ROUGH)
         except SolveError:
             # Without this Stribeck's friction on a shaken support ends a search with an error.
             break
@@ -214,7 +196,7 @@ def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fi
     current = fitted.problem.diffusion
     for diffusion in (current, *reversed(levels[: levels.index(current)] if current in levels else ())):
         problem = fitted.problem.with_model_error(diffusion)
-        fitted = _nearly(solve(fitted.measurements, problem, fitted.point, steps, done(fitted)), steps)
+        fitted = _nearly(minimise(problem, fitted.point, steps, fitted.smallest_decrease), steps)
         if fitted.converged:
             break
     return fitted
@@ -232,7 +214,7 @@ def with_negligible_model_error(fitted: Fit) -> Fit:
         return fitted
     limit = tuple(_NEGLIGIBLE * q for q in fitted.problem.diffusion)
     try:
-        result = solve(fitted.measurements, fitted.problem.with_model_error(limit), fitted.point, FEW)
+        result = minimise(fitted.problem.with_model_error(limit), fitted.point, FEW)
     except FitError:
         return fitted
     if not _stands(result, fitted):
@@ -257,56 +239,10 @@ def with_noise_correlation(fitted: Fit, enough: float | None = None) -> Fit:
     if fitted.leverage > _LOOSE:
         return fitted
     # Without this k0 and k2 of a record with coloured noise move by three standard errors.
-    sd = fitted.noise.sd(fitted.record, fitted.blurring)
-    memory = noise_autocorrelation(fitted.record, fitted.misfit, sd, fitted.noise.weight)
+    memory = noise_autocorrelation(fitted.record, fitted.misfit, fitted.noise_sd, fitted.noise.weight)
     if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
         return fitted
     noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
     problem = replace(fitted.problem, noise=replace(noise, memory=memory))
-    result = solve(fitted.measurements, problem, fitted.point, STEPS, enough or _enough(problem))
+    result = minimise(problem, fitted.point, STEPS, enough or _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted
-
-
-def with_larger_model_error(fitted: Fit, scatter: float) -> Fit:
-    """Increase the model-error variance until chi2 per degree of freedom is below a limit.
-
-    With a small model error a wrong model distorts states and parameters. With a larger one its residuals
-    show what is missing. If even the largest of the schedule leaves the fit far from explaining the data, the
-    error is increased tenfold, twice at most; such a fit has no level.
-    """
-    schedule, result = fitted.problem.schedule, fitted
-    for diffusion in reversed(schedule[: fitted.level]):
-        if result.scatter < scatter:
-            return result
-        result = solve(fitted.measurements, fitted.problem.with_model_error(diffusion), result.point)
-    for factor in (10.0, 100.0) if far_off(result) else ():
-        if result.scatter < scatter:
-            break
-        beyond = fitted.problem.with_model_error(tuple(factor * q for q in schedule[0]))
-        result = solve(fitted.measurements, beyond, result.point)
-    return result
-
-
-def at_level(fitted: Fit, level: int) -> Fit:
-    """Fit the same model at a level of the schedule."""
-    if level == fitted.level:
-        return fitted
-    problem = fitted.problem.with_model_error(fitted.problem.schedule[level])
-    return solve(fitted.measurements, problem, fitted.point, decrease=done(fitted))
-
-
-def eased(fitted: Fit) -> Fit:
-    """Fit the same model at the most probable model error, starting at the end of a fit."""
-    problem = replace(fitted.problem, likeliest=True)
-    return _increase_model_error(replace(fitted, problem=problem), problem.schedule)
-
-
-def smoothed_states(fitted: Fit, record: Record, level: int) -> Fit:
-    """Estimate the states of another record, with all parameters fixed, at a level of the schedule.
-
-    A wrong model may not reach that level; the result's level says how far it came.
-    """
-    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
-    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
-    start = Point(record.states, fitted.point.sets)
-    return reduce_model_error(fitted.measurements, problem, start, problem.schedule[: level + 1])

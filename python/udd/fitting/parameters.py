@@ -46,22 +46,7 @@ def free_parameters(
     priors: Mapping[str, tuple[float, float]] | None = None,
     each: Iterable[str] | None = None,
 ) -> tuple[Free, ...]:
-    """Return the free parameters of a fit.
-
-    Parameters
-    ----------
-    models : sequence of Disk or Pendulum
-        One per film; their values are the means of the priors.
-    free : iterable of str, optional
-        Names of the model's free parameters. By default ``k0, k1, k2, W`` of a disk, ``k0, length, inertia``
-        of a pendulum, and the amplitudes of all effects.
-    camera : bool or iterable of str
-        True if the camera's parameters are free, or the names of the free ones.
-    priors : mapping of str to (mean, standard deviation), optional
-        Replaces the default priors.
-    each : iterable of str, optional
-        Parameters of the model with a separate value for every film; default: the drive ``W``. Those of the
-        camera always have one.
+    """Return the free parameters of a fit of one model per film; the options are those of :func:`udd.fit`.
 
     Raises
     ------

@@ -139,31 +139,21 @@ def record_of(
     FitError
         It is not a measurement, or has too few observed frames.
     """
-    if not isinstance(measurement, Measurement):
-        if isinstance(measurement, (list, tuple)) and len(measurement):
-            models = model if isinstance(model, Sequence) else [model] * len(measurement)
-            starts = state0 if isinstance(state0, Sequence) else [state0] * len(measurement)
-            if len(starts) != len(measurement):
-                raise FitError(
-                    f"got {len(measurement)} measurements but {len(starts)} starts; expected one each"
-                )
-            if len(models) != len(measurement):
-                raise FitError(
-                    f"got {len(measurement)} measurements but {len(models)} models; expected one, or one each"
-                )
-            alone = len(measurement) == 1
-            records = [
-                _record_of(*arguments, alone) for arguments in zip(measurement, models, starts, strict=True)
-            ]
-            return _joined(records if alone else _together(measurement, records))
-        raise FitError(
-            f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r:.80}"
-        )
-    if isinstance(model, Sequence):
-        if len(model) != 1:
-            raise FitError(f"got one measurement but {len(model)} models; expected one model")
-        (model,) = model
-    return _record_of(measurement, model, state0, alone=True)
+    several = not isinstance(measurement, Measurement)
+    measurements: Sequence[Any] = measurement if isinstance(measurement, (list, tuple)) else [measurement]
+    for part in measurements or [measurement]:
+        if not isinstance(part, Measurement):
+            raise FitError(f"a measurement is needed (udd.track or udd.read_measurement), not {part!r:.80}")
+    count = len(measurements)
+    models = model if isinstance(model, Sequence) else [model] * count
+    starts = state0 if several and isinstance(state0, Sequence) else [state0] * count
+    for given, what, expected in ((starts, "starts", "one each"), (models, "models", "one, or one each")):
+        if len(given) != count:
+            plural = "s" * (count != 1)
+            raise FitError(f"got {count} measurement{plural} but {len(given)} {what}; expected {expected}")
+    alone = count == 1
+    records = [_record_of(*arguments, alone) for arguments in zip(measurements, models, starts, strict=True)]
+    return _joined(records if alone else _together(measurements, records))
 
 
 def _together(measurements: Sequence[Measurement], records: Sequence[Record]) -> list[Record]:
@@ -208,12 +198,8 @@ def _changes(record: Record) -> bool:
     return bool((high > low).any())
 
 
-def _record_of(measurement: Any, model: Any, state0: Any, alone: bool) -> Record:
+def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -> Record:
     """Prepare one measurement as :func:`record_of` does, to be fitted alone or together with others."""
-    if not isinstance(measurement, Measurement):
-        raise FitError(
-            f"a measurement is needed (udd.track or udd.read_measurement), not {measurement!r:.80}"
-        )
     fewest = _FEWEST if alone else _FEWEST_OF_SEVERAL
     measurement = unwrapped(measurement, angles_of(model))
     formula_model = model if isinstance(model, FormulaModel) else None

@@ -67,11 +67,15 @@ def roughness(values: Array) -> Array:
     The least of the estimates counts. Differences of a smooth motion decrease with their order; those of
     noise have its variance times the central binomial coefficient.
     """
-    shown = []
-    for order in _ORDERS[: max(len(values) - _ORDERS[0], 1)]:
-        scale = math.sqrt(math.comb(2 * order, order))
-        shown.append(np.median(np.abs(np.diff(values, order, axis=0)), axis=0) / 0.6745 / scale)
-    result: Array = np.min(shown, axis=0)
+    orders = _ORDERS[: max(len(values) - _ORDERS[0], 1)]
+    result: Array = np.min([noise_by_differences(values, order) for order in orders], axis=0)
+    return result
+
+
+def noise_by_differences(values: Array, order: int) -> Array:
+    """Compute the s.d. of white noise with differences of this order as large as those of columns (n, c)."""
+    size = np.median(np.abs(np.diff(values, order, axis=0)), axis=0) / 0.6745
+    result: Array = size / math.sqrt(math.comb(2 * order, order))
     return result
 
 

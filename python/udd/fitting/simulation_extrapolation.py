@@ -16,9 +16,9 @@ from udd.errors import FitError
 from udd.measurement import InputSignal, Measurement
 
 from .fit import fit as fit_again
+from .fit_result import Fit
 from .input_noise import noise_of
-from .problem import Fit
-from .solve import SolveError
+from .minimum import SolveError
 
 __all__ = ["InputBias", "input_bias"]
 

@@ -13,9 +13,8 @@ from udd.measurement import Measurement
 from udd.measurement.unwrapping import unwrapped
 from udd.models import profile_of
 
-from .input_noise import noise_by_differences
 from .record import odd_frames
-from .sensor import is_encoder, lattice
+from .sensor import is_encoder, lattice, noise_by_differences
 
 Array = NDArray[np.float64]
 
@@ -121,7 +120,7 @@ def _change_of(t: Array, x: Array, step: float, noise: float) -> float:
 
 def _noise(x: Array) -> float:
     """Estimate the s.d. of a column's noise from fifth differences, in which motion is small."""
-    return noise_by_differences(x, 5)
+    return float(noise_by_differences(x, 5))
 
 
 def _averaged(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import Fit
+from .fit_result import Fit
 
 _UNITS = 24  # minimum length of the fitted part, in units of the time scale
 

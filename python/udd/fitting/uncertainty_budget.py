@@ -13,14 +13,13 @@ from udd._util.one_line import OneLine
 from udd._util.validation import number
 from udd.errors import FitError
 
-from .estimator_input import FilmParameters
+from .minimum import minimum
 from .problem import Point
-from .solve import solve
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .problem import Fit
+    from .fit_result import Fit
 
 _CAMERA, _NOISE, _MODEL = "camera", "noise", "model error"
 
@@ -204,8 +203,8 @@ def _moved(fit: Fit, name: str, by: float) -> NDArray[np.float64]:
     problem = fit.problem.with_model_error(fit.limit or fit.problem.diffusion)
     order = list(fit.model.parameters).index(name)
     models = tuple(model.with_parameters({name: model.parameters[name] + by}) for model in problem.models)
-    sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fit.point.sets]
-    for values, _camera, _clock in sets:
-        values[order] += by
-    again = solve(fit.measurements, replace(problem, models=models), Point(fit.states, tuple(sets)))
-    return np.array([again.parameters[f.name] - fit.parameters[f.name] for f in problem.free])
+    sets = fit.point.with_values(
+        lambda values: [*values[:order], values[order] + by, *values[order + 1 :]]
+    ).sets
+    end = minimum(replace(problem, models=models), Point(fit.states, sets)).point
+    return np.array([end.value(f) - fit.parameters[f.name] for f in problem.free])

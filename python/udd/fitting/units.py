@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.errors import FitError
+from udd.errors import FitError, outside
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
 from udd.models.profile import OtherUnit
 
-from .problem import Fit
+from .fit_result import Fit
+from .minimum import SolveError
+from .noise import stated
+from .noise_estimation import solve_with_noise
+from .parameters import free_parameters
+from .problem import Problem, levels, one_model_each, start_point
 from .record import Record, record_of
 
 Array = NDArray[np.float64]
@@ -25,6 +32,11 @@ _FIRST = 0.6  # share of these frames; the rest is tested by itself, too
 #: Gain in log likelihood per observed number (nats) that another unit needs. Right units win by 0.5 and more,
 #: even if a strong effect is missing; a missing effect favours a wrong unit by at most a tenth of that.
 _CLEARLY = 0.3
+_RUNAWAY_SD = 10.0  # standard deviations from the given value: the fit describes another device
+#: chi2 per degree of freedom above which a model does not explain its data, whatever it lacks.
+UNEXPLAINED = 2.5
+_MAX_DRIVE_RATIO = 3.0  # ratio to the given drive that no missing effect explains
+_MAX_FREQUENCY_RATIO = 2.0  # ratio to a pendulum's given length over inertia
 
 
 @dataclass(frozen=True)
@@ -64,11 +76,6 @@ class Scale:
 
 STATED = Scale({}, {})
 
-#: Callable that fits models to a record's frames from given start models, with some parameters fixed.
-Fitter = Callable[
-    [Record, Sequence[Measurement], Sequence[Model], Sequence[Model], Scale, frozenset[str]], Fit
-]
-
 
 def ask(measurements: Sequence[Measurement], models: Sequence[Model]) -> None:
     """Reject numbers that cannot be in s, m and rad, before a fit tries to follow them.
@@ -100,23 +107,17 @@ def drive_seen(measurement: Measurement) -> float:
 
 
 def other_unit(
-    measurements: Sequence[Measurement], models: Sequence[Model], ends: Sequence[Sequence[Model]], fit: Fitter
+    measurements: Sequence[Measurement],
+    models: Sequence[Model],
+    ends: Sequence[Sequence[Model]],
+    free: Sequence[str],
 ) -> str | None:
     """Return a message about a unit that explains the record far better than the given one, or None.
 
     It must explain the record better, and also its last part by itself, so that chance has to favour it
     twice. If the unit of a parameter is in question, that parameter is fixed in both units; all other unknown
-    parameters are free. A unit that only compensates a slightly wrong parameter explains no more than the fit
-    in which the parameter is free.
-
-    Parameters
-    ----------
-    measurements, models : sequences
-    ends : sequence of sequence of Model
-        End points of fits in the given unit, used as further starts.
-    fit : callable
-        Fits with a large model error. Drive and camera are fixed at their given values: if they are free and
-        an effect is missing, the fit converges to anything.
+    parameters (`free`) are free. A unit that only compensates a slightly wrong parameter explains no more
+    than the fit in which the parameter is free. `ends` are models of fits in the given unit: further starts.
     """
     short = [m.rows(np.arange(min(_FRAMES, len(m)))) for m in measurements]
     record = record_of(short, models)
@@ -126,26 +127,13 @@ def other_unit(
     margin = _CLEARLY * np.array([record.observed.sum(), last.observed.sum()])
 
     def evidence(
-        part: Record,
-        converted: Sequence[Model],
-        scale: Scale,
-        fixed: frozenset[str],
-        start: Sequence[Model] | None = None,
+        part: Record, converted: Sequence[Model], scale: Scale, fixed: frozenset[str], start: Sequence[Model]
     ) -> float:
-        """Return the evidence of a part of the record; -inf if it cannot be fitted."""
-        columns, states = short[0].names, converted[0].state_names
+        names = [name for name in free if name not in fixed]
         try:
-            fitted = fit(
-                scale.record(part, columns, states),
-                short,
-                converted,
-                start or converted,
-                scale,
-                fixed,
-            )
+            return _evidence(part, short, converted, start, scale, names)
         except FitError:
             return -np.inf
-        return fitted.evidence + scale.density(part, columns)
 
     def as_stated(converted: Sequence[Model], fixed: frozenset[str], start: Sequence[Model]) -> Array:
         """Return the evidence of the record, and of its last part by itself, in the given unit."""
@@ -153,7 +141,7 @@ def other_unit(
         return np.array(parts if min(parts) > -np.inf else [-np.inf, -np.inf])
 
     @functools.cache
-    def stated(fixed: frozenset[str]) -> Array:
+    def in_given_unit(fixed: frozenset[str]) -> Array:
         starts = [models] if fixed else [models, *ends]
         best: Array = np.max([as_stated(models, fixed, start) for start in starts], axis=0)
         return best
@@ -163,17 +151,19 @@ def other_unit(
         units = [unit for unit in tried if unit]
         if len(units) < len(tried):
             continue
-        converted = [model.with_parameters({**model.parameters, **u.parameters}) if u.parameters else model
-               for model, u in zip(models, units, strict=True)]  # fmt: skip
+        converted = [
+            model.with_parameters({**model.parameters, **unit.parameters}) if unit.parameters else model
+            for model, unit in zip(models, units, strict=True)
+        ]
         doubted, scale = frozenset(units[0].parameters), Scale(units[0].factors, units[0].shifts)
         if any(_mistaken(*pair, scale) for pair in zip(short, converted, strict=True)):
             continue  # numbers in this unit would be rejected
         # The last part first: with a wrong unit a pendulum may turn so fast that the whole record takes
         # seconds.
-        if not evidence(last, converted, scale, doubted) > stated(doubted)[1] + margin[1]:
+        if not evidence(last, converted, scale, doubted, converted) > in_given_unit(doubted)[1] + margin[1]:
             continue
-        value = evidence(record, converted, scale, doubted)
-        clearly = value > max(best, stated(doubted)[0] + margin[0], stated(frozenset())[0])
+        value = evidence(record, converted, scale, doubted, converted)
+        clearly = value > max(best, in_given_unit(doubted)[0] + margin[0], in_given_unit(frozenset())[0])
         if clearly and doubted:  # the less wrong of two lengths is not right
             clearly = as_stated(converted, frozenset(), converted)[0] < value + margin[0]
         if clearly:
@@ -186,5 +176,118 @@ def _units(measurement: Measurement, model: Model) -> Iterator[OtherUnit | None]
     profile = model.profile
     for other in profile.fit.other_units(model):
         drive = other.parameters.get(profile.dynamics.drive or "")
-        excluded = drive is not None and not 1 / _DECADE < drive_seen(measurement) / drive < _DECADE
-        yield None if excluded else other
+        yield None if drive is not None and _is_far(drive_seen(measurement) / drive, _DECADE) else other
+
+
+def _is_far(ratio: float, factor: float) -> bool:
+    """Return True if a ratio is not within a factor of 1."""
+    return not 1 / factor < ratio < factor
+
+
+def _evidence(
+    part: Record,
+    measurements: Sequence[Measurement],
+    models: Sequence[Model],
+    start: Sequence[Model],
+    scale: Scale,
+    free: Sequence[str],
+) -> float:
+    """Compute the evidence of a part of a record for models in a unit, with a large model error.
+
+    Drive and camera are fixed at their given values: if they are free and an effect is missing, the fit
+    converges to anything.
+    """
+    columns, states, profile = measurements[0].names, models[0].state_names, models[0].profile
+    record = scale.record(part, columns, states)
+    loose = np.array(levels(models[0].kind)[profile.fit.hardly :][:1]) * scale.sizes(states)
+    schedule = tuple(tuple(level) for level in loose.tolist())
+    problem = Problem(
+        models=tuple(models),
+        record=record,
+        free=free_parameters(models, free, profile.sensor.pivot, each=()),
+        noise=stated(record),
+        schedule=schedule,
+        diffusion=schedule[0],
+        likeliest=False,
+        measurements=tuple(measurements),
+    )
+    fitted = solve_with_noise(problem, start_point(start, measurements, record))
+    return fitted.evidence + scale.density(part, columns)
+
+
+def astray(fitted: Fit) -> bool:
+    """Return True if a fit is so bad, or so far from the given values, that a unit may be wrong.
+
+    A missing effect can do the same: :func:`udd.fitting.units.other_unit` distinguishes the two.
+    """
+    pairs = zip(fitted.models, fitted.problem.models, strict=True)
+    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or any(_is_frequency_off(*pair) for pair in pairs)
+
+
+def ran_away(fitted: Fit) -> bool:
+    """Return True if the fitted drive or camera has impossible values.
+
+    A strong missing effect causes that: the fit then compensates with a clock that is off by a third, or with
+    a drive a fifth of the given one.
+    """
+    stated = fitted.model.profile.fit.stated
+    parts = [f for f in fitted.problem.free if f.role != "model" or f.name.partition("[")[0] in stated]
+    return any(abs(fitted.point.value(f) - f.mean) > _RUNAWAY_SD * f.sd for f in parts)
+
+
+def _is_frequency_off(fitted: Model, given: Model) -> bool:
+    """Return True if the measured frequency is far from the model's, as a pendulum's may be."""
+    pace = given.profile.fit.pace
+    return pace is not None and _is_far(
+        pace(fitted.parameters) / pace(given.parameters), _MAX_FREQUENCY_RATIO
+    )
+
+
+def _is_drive_off(measurement: Measurement, model: Model) -> bool:
+    """Return True if the frames alone show a drive far from the given one."""
+    fit, name = model.profile.fit, model.profile.dynamics.drive
+    if fit.drive_seen is None or name is None or measurement.kind != model.kind or not model.parameters[name]:
+        return False
+    return _is_far(drive_seen(measurement) / model.parameters[name], _MAX_DRIVE_RATIO)
+
+
+def checked_units(
+    measurement: Measurement | Sequence[Measurement],
+    model: Model | Sequence[Model],
+    options: Mapping[str, Any],
+    fits: Callable[[], tuple[Fit, ...]],
+) -> tuple[Fit, ...]:
+    """Run fits and check whether the measurement's numbers may be in another unit than assumed.
+
+    `options` are ``free``, ``camera``, ``priors`` and ``each`` of :func:`fit`. If another unit explains the
+    measurement far better, :attr:`Fit.unit_doubt` says so, and a warning.
+
+    Raises
+    ------
+    FitError
+        The numbers cannot be in s, m and rad; or `fits` raises it.
+    """
+    measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
+    models = one_model_each(model, measurements)
+    free_parameters(models, **options)  # raises if an option is wrong
+    ask(measurements, models)
+    free, unknown = options["free"], models[0].profile.fit.unknown
+
+    def doubt(ends: Sequence[Sequence[Model]] = ()) -> str | None:
+        unknown_free = [name for name in unknown if free is None or name in free]
+        text = other_unit(measurements, models, ends, unknown_free) if unknown else None
+        if text:
+            warnings.warn(f"{text}; the fit continues with the given units", stacklevel=outside())
+        return text
+
+    is_drive_off = any(_is_drive_off(*pair) for pair in zip(measurements, models, strict=True))
+    text = doubt() if is_drive_off else None
+    try:
+        fitted = fits()
+    except SolveError as error:
+        if text := text if is_drive_off else doubt():  # most probably the reason
+            raise FitError(f"{error}; {text}") from error
+        raise
+    if not is_drive_off and any(astray(each) for each in fitted):
+        text = doubt([each.models for each in fitted])
+    return tuple(replace(each, unit_doubt=text) for each in fitted) if text else fitted

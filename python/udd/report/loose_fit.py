@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from udd.fitting import Fit
+from udd.fitting import Fit, minimise
 from udd.fitting.problem import FOLLOWS
-from udd.fitting.solve import solve
 
 
 def loosest(fit: Fit) -> Fit:
@@ -17,7 +16,7 @@ def loosest(fit: Fit) -> Fit:
         return fit
     result = fit
     for diffusion in fit.problem.schedule:
-        result = solve(fit.measurements, fit.problem.with_model_error(diffusion), fit.point)
+        result = minimise(fit.problem.with_model_error(diffusion), fit.point)
         if result.leverage < FOLLOWS:
             break
     return result

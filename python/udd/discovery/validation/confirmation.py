@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from udd._util import chi_squared
 from udd._util.parallel import parallel_map
 from udd.discovery.thresholds import ALPHA, Confirmation
-from udd.fitting import Fit, Record, at_level, frame_costs, smoothed_states, within
+from udd.fitting import Fit, Record, at_level, smoothed_states, within
 
 from .held_out_errors import Ratio, block_numbers, cost_improvement
 
@@ -76,7 +76,7 @@ def held_out_ratio(before: Fit, after: Fit, rest: Record, unit: float) -> Ratio:
     """Compute the cost ratio of frames that were not fitted, after over before, all parameters fixed."""
     level = min(before.level, after.level)
     costs = same_level(smoothed_states(before, rest, level), smoothed_states(after, rest, level))
-    return cost_improvement(frame_costs(costs[0]), frame_costs(costs[1]), rest, unit=unit)
+    return cost_improvement(costs[0].frame_costs, costs[1].frame_costs, rest, unit=unit)
 
 
 def _held_out_chi2_falls(part: Pair, whole: Pair) -> bool:

@@ -196,7 +196,7 @@ def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> Ratio:
 def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0) -> Ratio:
     """Compute the ratio of two fits' costs on a held-out record, with its 95 % interval from paired blocks.
 
-    The costs are those of :func:`udd.fitting.frame_costs`. They distinguish two models even if their
+    The costs are those of :attr:`udd.Fit.frame_costs`. They distinguish two models even if their
     forecasts are equally good.
     """
     costs = np.column_stack([after, before])

@@ -1,0 +1,92 @@
+"""Predict and filter motion with all parameters fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from udd import _core
+from udd.errors import FitError
+from udd.models import Model
+
+from .estimator_input import EstimatorInput, FilmParameters, Observations
+
+if TYPE_CHECKING:
+    from .fit_result import Fit
+    from .record import Record
+
+Array = NDArray[np.float64]
+
+
+def predicted(
+    models: Sequence[Model],
+    sets: Sequence[FilmParameters],
+    film: NDArray[np.int64],
+    t0: Array,
+    states: Array,
+    times: Array,
+) -> Array:
+    """Predict the observations at times (k, h), increasing, after starts (k,), by the models alone.
+
+    Parameters
+    ----------
+    models : sequence of Model
+        One per film, with the same parameters; their values are those of `sets`.
+    sets : sequence of FilmParameters
+        As a fit's ``point.sets``.
+    film : ndarray of int (k,)
+        Film of each start.
+    t0, states : ndarray (k,), (k, d)
+    times : ndarray (k, h)
+
+    Returns
+    -------
+    ndarray (k, h, m)
+        NaN after the point at which the model's solution diverges.
+    """
+    try:
+        return _core.predict(models[0], sets, film.tolist(), t0, states, times)
+    except FitError:
+        if len(t0) > 1:
+            rows = [slice(k, k + 1) for k in range(len(t0))]
+            some = [predicted(models, sets, film[k], t0[k], states[k], times[k]) for k in rows]
+            return np.concatenate(some)
+        return _as_far_as_it_runs(models, sets, film, t0, states, times)
+
+
+def _as_far_as_it_runs(
+    models: Sequence[Model],
+    sets: Sequence[FilmParameters],
+    film: NDArray[np.int64],
+    t0: Array,
+    states: Array,
+    times: Array,
+) -> Array:
+    """Predict one run that does not reach its last time, with bisection for the last time that it reaches."""
+    reached, beyond = 0, times.shape[1]
+    # The observation at the start itself takes no run and gives the number of columns.
+    result = np.repeat(_core.predict(models[0], sets, film.tolist(), t0, states, t0[:, None]), beyond, axis=1)
+    while beyond - reached > 1:
+        half = (reached + beyond) // 2
+        try:
+            result[:, :half] = _core.predict(models[0], sets, film.tolist(), t0, states, times[:, :half])
+            reached = half
+        except FitError:
+            beyond = half
+    result[:, reached:] = np.nan
+    return result
+
+
+def filtered(
+    fitted: Fit, record: Record, windows: NDArray[np.int64], diffusion: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """Filter windows of frames: states at the first and the last frame, covariance of the last.
+
+    All parameters are those of a fit.
+    """
+    seen = Observations.of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
+    fixed = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
+    return _core.filter(fixed, [(int(a), int(b)) for a, b in windows])
