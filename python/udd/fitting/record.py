@@ -149,8 +149,8 @@ def record_of(
     starts = state0 if several and isinstance(state0, Sequence) else [state0] * count
     for given, what, expected in ((starts, "starts", "one each"), (models, "models", "one, or one each")):
         if len(given) != count:
-            plural = "s" * (count != 1)
-            raise FitError(f"got {count} measurement{plural} but {len(given)} {what}; expected {expected}")
+            number = "one measurement" if count == 1 else f"{count} measurements"
+            raise FitError(f"got {number} but {len(given)} {what}; expected {expected}")
     alone = count == 1
     records = [_record_of(*arguments, alone) for arguments in zip(measurements, models, starts, strict=True)]
     return _joined(records if alone else _together(measurements, records))
