@@ -8,6 +8,7 @@ import json
 import shutil
 import time
 from collections.abc import AsyncIterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,12 @@ from starlette.testclient import TestClient
 
 import udd
 from app_for_tests import CHAOS, SOCKET, client
+from bob_films import arc, swing
+from film_for_tests import FPS, write
 from small_films import shot
 from udd.app import error_text, jobs, limits, report_parts, uploads, worker
 from udd.film import Defects
+from udd.markers.layout import NAMED, PALE
 from udd.report.document import Column, Figure, Gallery, Head, Image, Report, Section, Table
 
 __all__ = ["client"]
@@ -154,6 +158,40 @@ def test_a_refused_film_stays_for_clicks(client: TestClient, tmp_path: Path) -> 
     ):
         answer = client.post("/api/jobs/again", params=params, content=content)
         assert answer.status_code == 400 and words in answer.text
+
+
+def test_a_pendulums_film_is_tracked(client: TestClient, tmp_path: Path) -> None:
+    pytest.importorskip("cv2")
+    rate, length = np.sqrt(9.81 / 0.25), 900 * 0.25  # rad/s and pixels
+    t = np.arange(60) / FPS
+    theta = 0.2 * np.exp(-0.02 * t) * np.cos(rate * t)
+    film = write(tmp_path / "clock.mp4", swing([(*arc(theta, length), (190, 35, 40))], (140, 145, 140)))
+    said = sent(client, film.read_bytes(), bob="red", length="0.25")
+    assert "tracking the film" in said["stages"]
+    # too short to be fitted, but the motion is kept
+    assert "record for longer" in said["answer"]["error"]
+    assert [part["name"] for part in said["answer"]["parts"]] == ["measurement.csv"]
+    table = tmp_path / "motion.csv"
+    table.write_bytes(client.get(f"/api/jobs/{said['job']}/measurement.csv").content)
+    m = udd.read_measurement(table)
+    assert m.seen.all() and np.abs(m["theta"] - theta).max() < 2e-3 and m.meta["length"] == 0.25
+    other = sent(client, film.read_bytes(), bob="blue", length="0.25")
+    assert other["answer"]["error"].startswith("No bob of that colour moves in this film")
+    data = client.get(f"/api/jobs/{other['job']}/{jobs.REFUSED}").json()
+    assert data["pendulum"] and data["tools"] == ["bob", "pivot", "region"]
+    for params, words in (
+        ({"bob": "red"}, "needs the length"),
+        ({"bob": "pink", "length": "0.3"}, "Bob must be"),
+    ):
+        answer = client.post("/api/jobs/film", content=film.read_bytes(), params=params)
+        assert answer.status_code == 400 and words in answer.text
+
+
+def test_each_language_lists_the_colours_of_bobs() -> None:
+    for file in sorted(files("udd.app").joinpath("static").iterdir(), key=str):
+        if file.name.startswith("texts.") and file.name.endswith(".json"):
+            rows = json.loads(file.read_text(encoding="utf-8"))["loop_bobs"]
+            assert [value for value, _ in rows] == ["", *NAMED, *PALE], file.name
 
 
 def test_an_upload_is_no_larger_than_fits(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -307,11 +345,11 @@ def test_a_films_size_is_limited(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     sample = Path(udd.__file__).parent / "demo" / "sample.mp4"
     monkeypatch.setattr(limits, "PIXELS", 1000)
     with pytest.raises(udd.errors.UddError, match="too large"):
-        worker._tracked(sample, 0.08, {}, lambda _: None)
+        worker._check(sample)
     monkeypatch.undo()
     monkeypatch.setattr(limits, "FRAMES", 100)
     with pytest.raises(udd.errors.UddError, match="at most 100"):
-        worker._tracked(sample, 0.08, {}, lambda _: None)
+        worker._check(sample)
 
 
 def test_the_marks_are_told_while_a_film_is_tracked(tmp_path: Path) -> None:
@@ -322,7 +360,7 @@ def test_the_marks_are_told_while_a_film_is_tracked(tmp_path: Path) -> None:
     run = udd.simulate(udd.Disk(0.03), times, [2.0, 0.02, -0.02, 0.0])
     film = udd.render(run, tmp_path / "short.mp4", size=(330, 420), scale=1050)
     told: list[dict[str, Any]] = []
-    measured = worker._tracked(film.path, 0.08, {}, told.append)
+    measured = worker._tracked(film.path, {"disk_radius": 0.08}, told.append)
     frames = [message for message in told if "frame" in message]
     assert frames[-1]["frame"]["number"] == frames[-1]["frame"]["of"] == len(measured)
     picture = cv2.imdecode(np.frombuffer(base64.b64decode(frames[-1]["jpeg"]), np.uint8), cv2.IMREAD_COLOR)

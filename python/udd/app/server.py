@@ -8,7 +8,7 @@ import math
 import os
 import secrets
 import shutil
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,8 @@ from .spec import start_of
 from .stream import Page
 
 STATIC = Path(__file__).parent / "static"
-HINTS = ("clicks", "region", "fps", "leave_out")  # options of the tracker that a page may send
+#: Options of the tracker that a page may send.
+HINTS = ("clicks", "region", "fps", "leave_out", "pivot", "bob")
 
 
 def make_app(
@@ -200,7 +201,9 @@ _NUMBERS = ("W", "R", "length", "begin", "end")
 
 async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
     """Return the question to a job; its file is put into its folder."""
-    given = {name: value for name in _NUMBERS if (value := _number(request, name)) is not None}
+    given: dict[str, Any] = {
+        name: value for name in _NUMBERS if (value := _number(request, name)) is not None
+    }
     if kind == "film":
         declared = request.headers.get("content-length", "0")
         if declared.isdigit() and int(declared) > limits.UPLOAD:
@@ -208,6 +211,8 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
         file = await uploads.receive(request.stream(), folder)
         chosen = parsed("the columns", request.query_params.get("columns") or "[]")
         film = file.suffix == ".film"
+        if film and (bob := request.query_params.get("bob")):
+            given["bob"] = _bob(bob, given)
         return {"kind": "loop", "file": file.name, "film": film, "columns": chosen, **given}
     if kind == "sample":
         from udd.demo import pipeline
@@ -231,6 +236,16 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             raise UddError(f"A film lasts from 0.5 to {limits.RENDERED:g} s.")
         return {"kind": "render", "start": start, "seconds": seconds}
     raise UddError("There is no such job.")
+
+
+def _bob(colour: str, given: Mapping[str, Any]) -> str:
+    """Check the colour of a pendulum's bob, whose length must be given."""
+    from udd.markers.layout import read_bob
+
+    read_bob(colour)
+    if not given.get("length"):
+        raise UddError("A pendulum's film needs the length, in m, from the pivot to the bob.")
+    return colour
 
 
 def _number(request: Request, name: str) -> float | None:

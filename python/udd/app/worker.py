@@ -16,7 +16,7 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from udd._util.json_output import as_json
 from udd.errors import UddError
@@ -24,6 +24,9 @@ from udd.errors import UddError
 from . import child_process, limits
 from .error_text import sentence
 from .jobs import REFUSED
+
+if TYPE_CHECKING:
+    from udd.measurement import Measurement
 
 OUT = Path("out")
 _PICTURES_EVERY = 0.2  # s between the frames that are shown
@@ -91,19 +94,24 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     from .table_columns import measurement_of
 
     file = Path(asked["file"])
-    constants = {k: asked[k] for k in ("W", "R", "origin") if asked.get(k) is not None}
-    film = asked["film"]
+    film, bob = asked["film"], asked.get("bob")
+    of_device = () if bob else ("W", "R", "origin")
+    constants = {k: asked[k] for k in of_device if asked.get(k) is not None}
     tell({"say": "reading the film" if film else "reading the table"})
     if film:
-        hints = asked.get("hints") or {}
-        measurement = _tracked(file, constants.get("R", 0.08), hints, tell, "W" in constants)
-        measurement = measurement.with_meta(**constants)
+        _check(file)
+        if bob is None and "W" not in constants:
+            raise UddError(_NO_DRIVE)
+        options = {"bob": bob, "length": asked["length"]} if bob else {"disk_radius": 0.08}
+        options |= {"disk_radius": constants["R"]} if "R" in constants else {}
+        measurement = _tracked(file, {**options, **(asked.get("hints") or {})}, tell).with_meta(**constants)
     else:
         measurement = measurement_of(file, asked.get("columns") or [], constants)
         measurement = between(measurement, asked.get("begin"), asked.get("end"))
     measurement.to_csv(OUT / "measurement.csv")
     swings = measurement.names in (("theta",), ("Omega",))
-    length, R = asked.get("length") or measurement.meta.get("length"), measurement.meta.get("R", 0.08)
+    length: Any = asked.get("length") or measurement.meta.get("length")
+    R: Any = measurement.meta.get("R", 0.08)
     if swings and not length:
         raise UddError("this is a pendulum's record: say its length in cm")
     if measurement.inputs:
@@ -127,11 +135,9 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     return {**result.of(discovery), "parts": report_parts.save_parts(report, OUT)}
 
 
-def _tracked(file: Path, radius: float, hints: dict[str, Any], tell: Tell, drive: bool = True) -> Any:
-    """Track a film with what was clicked in it, and show it meanwhile; a refused film leaves frames."""
-    import cv2
-
-    from udd.tracking import Film, TrackedFrame, TrackError, track_disk
+def _check(file: Path) -> None:
+    """Refuse a film that is too large or cut off."""
+    from udd.tracking import Film, TrackError
 
     film = Film(file)
     if math.prod(film.size) > limits.PIXELS:
@@ -141,8 +147,15 @@ def _tracked(file: Path, radius: float, hints: dict[str, Any], tell: Tell, drive
     missing = film.promised - film.packets
     if missing > _CUT * film.promised:
         raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
-    if not drive:
-        raise UddError(_NO_DRIVE)
+
+
+def _tracked(file: Path, options: dict[str, Any], tell: Tell) -> Measurement:
+    """Track a film, and show it meanwhile; a refused film leaves frames to click on."""
+    import cv2
+
+    from udd.tracking import TrackedFrame, TrackError
+    from udd.tracking.pipeline import Tracking, run_tracker
+
     tell({"say": "looking over the film"})
     last = 0.0
 
@@ -175,18 +188,20 @@ def _tracked(file: Path, radius: float, hints: dict[str, Any], tell: Tell, drive
             tell({"say": "refining the positions"})
 
     try:
-        done = track_disk(file, disk_radius=radius, watch=watch, config=hints, progress=stage)
-        return done.measurement
+        done = run_tracker(file, watch=watch, config=options, progress=stage)
+        return done.measurement if isinstance(done, Tracking) else done
     except UddError:
-        _leave_frames(file, hints)
+        _leave_frames(file, options)
         raise
 
 
-def _leave_frames(file: Path, hints: dict[str, Any]) -> None:
+def _leave_frames(file: Path, options: dict[str, Any]) -> None:
     """Write frames to click on, and the clicks so far."""
     from udd.report.refused_film import click_data, look
 
-    refused = look(file, hints) or look(file, {})  # clicks that cannot be used are no reason to show nothing
+    bob = {"bob": options["bob"]} if "bob" in options else {}
+    # clicks that cannot be used are no reason to show nothing
+    refused = look(file, options) or look(file, bob)
     if refused is not None:
         (OUT / REFUSED).write_text(as_json(click_data(refused)), encoding="utf-8")
 

@@ -99,6 +99,8 @@ def sections(
     """Build the sections on motion, errors, residuals, candidates, limits and numbers."""
     # If several films were fitted together, the first one is shown.
     first_record = replace(discovery, baseline=first_film(discovery.baseline), fit=first_film(discovery.fit))
+    if not discovery.fit.model.profile.shown.contact:
+        film = None  # the motion is drawn: only a disk is drawn over frames
     made = [_measured(discovery, first_record, film), _errors(discovery), _residuals(discovery, surprises)]
     if not discovery.effects:
         return (*made, _tried(discovery), _limits(discovery), _numbers(discovery, first_record))

@@ -242,7 +242,8 @@ def run_tracker(
         with _looking_over(film, progress):
             look_over, camera = steadied(film, survey(film))
         with _bar(film, film.packets, "track", progress) as bar:
-            return track_bob(film, look_over, camera, options, lambda _: bar.update())
+            tell = _teller(film, None, film.promised or film.packets, bar, watch)
+            return track_bob(film, look_over, camera, options, tell)
     if options.tags:
         return _track_tags(film, options, progress, watch)
     return _track_marks(film, options, progress, watch)
@@ -380,20 +381,21 @@ def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Wa
     """Track printed tags: each frame by itself, in one pass."""
     frames = film.promised or film.packets
     with _bar(film, frames, "track", progress) as bar:
-        tell = _teller(film, DiskAppearance([], 0.0, 1.0, film.light, np.inf), frames, bar, watch)
+        tell = _teller(film, None, frames, bar, watch)
         tracks, state = follow_tags(film, film.pictures(), options, tell)
     return _with_doubts(film, _to_metres(film, _unwrap(tracks, state.exposure), state, options, None, False))
 
 
 def _teller(
-    film: Film, look: DiskAppearance, frames: int, bar: Count, watch: Watch | None
+    film: Film, look: DiskAppearance | None, frames: int, bar: Count, watch: Watch | None
 ) -> Callable[[Picture, Pose], None]:
     """Return the function that a pass calls after each picture: it moves the bar and calls `watch`."""
+    shown = DiskAppearance([], 0.0, 1.0, film.light, np.inf) if look is None else look
 
     def tell(picture: Picture, pose: Pose) -> None:
         bar.update()
         if watch is not None:
-            watch(TrackedFrame(picture, pose, look, frames, film.full_range))
+            watch(TrackedFrame(picture, pose, shown, frames, film.full_range))
 
     return tell
 

@@ -28,6 +28,8 @@ export class Loop {
     for (const name of ["W", "R", "length"]) $(`loop-${name}`).addEventListener("input", () => this.tell());
     for (const name of ["wheel", "rpm"]) $(`loop-${name}`).addEventListener("input", () => this.fromWheel());
     this.columns = new Columns(() => this.tell());
+    $("loop-bob").append(...list("loop_bobs").map(([value, text]) => new Option(text, value)));
+    $("loop-bob").addEventListener("change", () => this.tell());
     $("file").addEventListener("change", () => this.choose($("file").files[0]));
     $("go").addEventListener("click", () => this.send());
     $("track-again").addEventListener("click", () => this.again());
@@ -76,6 +78,7 @@ export class Loop {
     this.table = null;
     this.fail("");
     this.columns.hide();
+    $("bob-box").hidden = !this.isFilm;
     $("chosen").textContent = file ? t("loop_chosen", { name: file.name, size: (file.size / 2 ** 20).toFixed(1) }) : "";
     if (file && this.tooLarge) this.fail(t("loop_too_large", { size: this.page.catalogue.limits.upload >> 20 }));
     this.tell();
@@ -102,6 +105,11 @@ export class Loop {
     return this.file?.type.startsWith("video/") || FILMS.test(this.file?.name ?? "");
   }
 
+  /** The colour of the bob if the film shows a pendulum. */
+  get bob() {
+    return this.isFilm ? $("loop-bob").value : "";
+  }
+
   get tooLarge() {
     return this.file && this.file.size > this.page.catalogue.limits.upload;
   }
@@ -120,6 +128,7 @@ export class Loop {
     if (!this.file) return t("why_file");
     if (this.tooLarge) return t("why_large");
     if (Object.values(this.fields).some((field) => field.wrong)) return t("why_number");
+    if (this.bob) return this.said("length") ? "" : t("why_length");
     if (this.isFilm) return this.said("W") ? "" : t("why_W");
     if (this.reading) return t("why_reading");
     if (!this.table) return "";
@@ -165,6 +174,7 @@ export class Loop {
       if (value !== null) values[name] = String(value);
     }
     const chosen = this.isFilm || !this.table ? [] : this.columns.chosen;
+    if (this.bob) values.bob = this.bob;
     if (chosen.length) values.columns = JSON.stringify(chosen);
     await this.begin("film", values, this.file);
   }

@@ -17,6 +17,7 @@ from udd.tracking.detection.bob import Background, Blob, BobColour, bob_colour, 
 from udd.tracking.detection.camera_motion import CameraMotion
 from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, is_copy, lost, unread
 from udd.tracking.detection.survey import Survey
+from udd.tracking.geometry.pose import Pose
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
@@ -54,7 +55,7 @@ def track_bob(
     look_over: Survey,
     camera: CameraMotion | None,
     options: TrackOptions,
-    tick: Callable[[Picture], object],
+    tick: Callable[[Picture, Pose], object],
 ) -> Measurement:
     """Measure the pendulum's angle in each frame; the options' layout holds the colours of one bob or two.
 
@@ -70,9 +71,10 @@ def track_bob(
         colour = bob_colour(film, some, behind, BobColour.of(rgb, chroma, film.full_range))
         bobs.append(BobTracker(behind, colour, usual_area(film, some, behind, colour)))
     for picture in film.pictures():
-        tick(picture)
         for bob in bobs:
             bob.follow(picture)
+        blob = bobs[0].rows[-1][2]
+        tick(picture, Pose(complex(np.nan, np.nan), np.nan) if blob is None else Pose(blob.centre, 0.0))
     first = bob_path(film, bobs[0], options)
     if len(bobs) == 1:
         return _pendulum(film, first, options, behind.grain, camera)
