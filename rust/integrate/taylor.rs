@@ -49,11 +49,12 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// If a law has nearly levelled off, as tanh does, its terms are too small to show the distance of its poles. The
     /// same holds for a series with gaps, such as one in powers of t^4, if the last terms fall into one. Where it has
     /// levelled
-    /// off entirely the polynomial may be wrong on the way only.
+    /// off entirely the polynomial may be wrong on the way only, and so it may be in a law with splines.
     #[inline(never)]
     fn obey(&mut self, at: &StepStart<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
         let from = vector!(S::Real, D; n => at.x[n].real());
         let flat = if self.tape.levels_off() { self.jets.flat(self.tape) } else { S::mask(false) };
+        let pieces = self.tape.is_in_pieces();
         let mut bad = S::mask(false);
         for halvings in 0..=MOST_HALVINGS {
             let Trial { size, error, .. } = *trial;
@@ -72,6 +73,10 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
                 known.and(defect.less(S::Real::constant(MOST_DEFECT)).not())
             };
             bad = strays(1.0);
+            // A coordinate may leave a spline's cell and return to it.
+            for &part in if pieces { &EIGHTHS[..7] } else { &[] } {
+                bad = bad.or(strays(part));
+            }
             if flat.any() {
                 for part in [0.25, 0.5, 0.75] {
                     bad = bad.or(flat.and(strays(part)));

@@ -203,6 +203,7 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         let d = vector!(S, N; i => self.d[i].fused(a.d[i], b.re).fused(b.d[i], a.re));
         Self { re: self.re.fused(a.re, b.re), d }
     }
+    const SYMBOLIC: bool = S::SYMBOLIC;
     const ORDER: usize = S::ORDER + 1;
     const DERIVATIVES: usize = if size_of::<S>() == size_of::<f64>() && N <= 4 { N } else { 0 };
 

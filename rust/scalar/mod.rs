@@ -5,6 +5,7 @@
 //! it gives many trajectories at once. Branches are therefore written with masks
 //! ([`Scalar::select`]) instead of `if`.
 
+mod cells;
 mod dual;
 pub mod elementary;
 mod fan;
@@ -15,6 +16,7 @@ mod packet;
 mod real;
 mod vector;
 
+pub use cells::{Cells, SplinePiece};
 pub use dual::Dual;
 pub use fan::DerivativeLanes;
 pub use interval::{Enclosed, Interval, Truth};
@@ -171,6 +173,11 @@ pub trait Real: Scalar<Real = Self> {
     fn lane(self, i: usize) -> f64;
     /// Changes lane `i`.
     fn set_lane(&mut self, i: usize, value: f64);
+    /// The polynomial of a cubic spline here; a recording knows it only during a run.
+    #[inline(always)]
+    fn piece(self, cells: Cells, coefficient: &dyn Fn(usize) -> Self) -> SplinePiece<Self> {
+        cells.piece(self, coefficient)
+    }
     /// Each lane by itself. Meant for what is one machine instruction or a few without branches.
     fn each(self, f: impl Fn(f64) -> f64) -> Self;
     /// The same for pairs of lanes.

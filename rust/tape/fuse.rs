@@ -93,6 +93,7 @@ impl Node {
                 (Some(a), None)
             }
             Node::Sin(a) | Node::Cos(a) | Node::Tanh(a) | Node::Slope(a) => (Some(a), None),
+            Node::Piece(place, ..) => (Some(place), None),
         };
         a.into_iter().chain(b)
     }

@@ -48,6 +48,7 @@ pub struct Tape<const D: usize> {
     program: fuse::Program,
     known: specialised::Specialised,
     levels_off: bool,
+    in_pieces: bool,
     switches_held: bool,
     driven: bool,
 }
@@ -68,6 +69,12 @@ impl<const D: usize> Tape<D> {
     #[inline(always)]
     pub fn levels_off(&self) -> bool {
         self.levels_off
+    }
+
+    /// Whether the law has splines: then a series is that of one of their cells.
+    #[inline(always)]
+    pub fn is_in_pieces(&self) -> bool {
+        self.in_pieces
     }
 
     /// Whether [held](Tape::held) values depend on the sides of surfaces.

@@ -6,7 +6,7 @@
 use super::series::{inner_at, inner_square_at};
 use super::symbol::Function;
 use crate::model::{PIECE_COEFFICIENTS, Sides};
-use crate::scalar::{InstructionSet, Scalar};
+use crate::scalar::{Cells, InstructionSet, Scalar};
 
 /// A value that does not change along a solution; operands are earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +73,9 @@ pub enum Node {
     Slope(u16),
     /// The first on the positive side of this surface, else the second.
     Select(u16, u16, u16),
+    /// Where the spline's cell around a place begins; its other slots are for the coefficients of the polynomial there.
+    /// The held values of the spline's coefficients begin at the second number.
+    Piece(u16, u16, Cells),
 }
 
 impl Node {
@@ -86,6 +89,7 @@ impl Node {
         match self {
             Node::Div(..) | Node::Over(..) | Node::Sqrt(_) | Node::Exp(_) => 2,
             Node::Ln(_) | Node::Sin(_) | Node::Tanh(_) => 3,
+            Node::Piece(..) => 5,
             Node::Cos(_) | Node::Slope(_) => 0,
             _ => 1,
         }
@@ -188,6 +192,14 @@ impl Step {
                 h!(c) * to[1][0]
             }
             Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a), of!(b)),
+            Node::Piece(place, at, cells) => {
+                let coefficient = |i: usize| held[usize::from(at) + i];
+                let (floor, powers) = cells.piece(of!(place).real(), &coefficient);
+                for (to, power) in to[1..].iter_mut().zip(powers) {
+                    to[0] = power;
+                }
+                S::lift(floor)
+            }
             Node::Sqrt(a) => {
                 to[0][0] = Function::Sqrt.of(of!(a));
                 to[1][0] = S::constant(0.5) / to[0][0];
@@ -257,7 +269,7 @@ impl Step {
         let (weight, inverse) = (k as f64, INVERSE[k]);
         of!(to, k) = match self.node {
             Node::Time if k == 1 => S::one(),
-            Node::Time | Node::Hold(_) => S::zero(),
+            Node::Time | Node::Hold(_) | Node::Piece(..) => S::zero(),
             // Known since the start.
             Node::Input(_) if k < PIECE_COEFFICIENTS => of!(to, k),
             Node::Input(_) => S::zero(),

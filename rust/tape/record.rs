@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::fuse::Program;
 use super::specialised::Specialised;
-use super::symbol::{self, Function, Made, Recording, SurfaceSideRef, Symbol};
+use super::symbol::{self, Function, Knots, Made, Recording, SurfaceSideRef, Symbol};
 use super::{Invariant, Node, Step, Tape};
 use crate::model::{Family, MAX_SURFACES, Sides, System};
 use crate::scalar::Scalar;
@@ -69,6 +69,7 @@ struct Lowering<'a> {
     held_at: HashMap<Symbol, u16>,
     slot_of: HashMap<Symbol, u16>,
     circle_of: HashMap<Symbol, u16>,
+    piece_of: HashMap<(Symbol, usize), u16>,
 }
 
 fn index(i: usize) -> u16 {
@@ -85,6 +86,7 @@ impl<'a> Lowering<'a> {
             held_at: HashMap::new(),
             slot_of: HashMap::new(),
             circle_of: HashMap::new(),
+            piece_of: HashMap::new(),
         }
     }
 
@@ -93,6 +95,7 @@ impl<'a> Lowering<'a> {
         assert!(rates.len() <= self.slots && MAX_SURFACES < usize::from(u8::MAX));
         let switches_held = self.held.iter().any(|held| matches!(held, Invariant::Select(..)));
         let driven = self.held.iter().any(|held| matches!(held, Invariant::Input(..)));
+        let in_pieces = self.steps.iter().any(|step| matches!(step.node, Node::Piece(..)));
         let levels_off = self.steps.iter().any(|step| step.node.levels_off());
         let program = Program::of(&self.steps, &rates, self.slots, true);
         let mut tape = Tape {
@@ -103,6 +106,7 @@ impl<'a> Lowering<'a> {
             slots: self.slots,
             known: Specialised::Not,
             levels_off,
+            in_pieces,
             switches_held,
             driven,
         };
@@ -123,7 +127,15 @@ impl<'a> Lowering<'a> {
         if let Some(&at) = self.held_at.get(&s) {
             return at;
         }
-        let held = match self.made(s) {
+        let held = self.invariant(s);
+        self.held.push(held);
+        let at = index(self.held.len() - 1);
+        self.held_at.insert(s, at);
+        at
+    }
+
+    fn invariant(&mut self, s: Symbol) -> Invariant {
+        match self.made(s) {
             Made::Constant(bits) => Invariant::Constant(f64::from_bits(bits)),
             Made::Parameter(i) => Invariant::Parameter(index(i)),
             Made::Neg(a) => Invariant::Neg(self.held(a)),
@@ -133,12 +145,10 @@ impl<'a> Lowering<'a> {
             Made::Div(a, b) => Invariant::Div(self.held(a), self.held(b)),
             Made::Apply(f, a) => Invariant::Apply(f, self.held(a)),
             Made::Select(j, a, b) => Invariant::Select(index(j), self.held(a), self.held(b)),
-            Made::Time | Made::State(_) | Made::Input(_) => unreachable!("time, state and inputs vary"),
-        };
-        self.held.push(held);
-        let at = index(self.held.len() - 1);
-        self.held_at.insert(s, at);
-        at
+            Made::Time | Made::State(_) | Made::Input(_) | Made::Piece(..) => {
+                unreachable!("time, state, inputs and pieces vary")
+            }
+        }
     }
 
     /// The place of an input's origin; its coefficients follow.
@@ -147,6 +157,21 @@ impl<'a> Lowering<'a> {
         let parts = 0..=index(crate::model::PIECE_COEFFICIENTS);
         self.held.extend(parts.map(|part| Invariant::Input(index(k), part)));
         at
+    }
+
+    /// Where the start of a spline's cell around a place is stored, and its polynomial's coefficients after it.
+    fn piece(&mut self, place: Symbol, knots: usize) -> u16 {
+        if let Some(&slot) = self.piece_of.get(&(place, knots)) {
+            return slot;
+        }
+        let Knots { cells, coefficients } = &self.recording.knots[knots];
+        let values: Vec<_> = coefficients.iter().map(|&s| self.invariant(s)).collect();
+        let at = index(self.held.len());
+        self.held.extend(values);
+        let node = Node::Piece(self.slot(place), at, *cells);
+        let slot = self.push(node);
+        self.piece_of.insert((place, knots), slot);
+        slot
     }
 
     fn push(&mut self, node: Node) -> u16 {
@@ -199,6 +224,7 @@ impl<'a> Lowering<'a> {
             Made::Apply(Function::Sin, a) => return self.circle(a),
             Made::Apply(Function::Cos, a) => return self.circle(a) + 1,
             Made::Select(j, a, b) => Node::Select(index(j), self.slot(a), self.slot(b)),
+            Made::Piece(part, place, knots) => return self.piece(place, knots) + index(part),
             Made::Constant(_) | Made::Parameter(_) => unreachable!("constants and parameters do not vary"),
         };
         self.push(node)

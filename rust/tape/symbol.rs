@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, elementary};
+use crate::scalar::{Cells, InstructionSet, Isa, Mask, Plain, Real, Scalar, SplinePiece, Work, elementary};
 
 /// A number while its model is recorded: its operation is known, its value is not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -39,6 +39,16 @@ pub(super) enum Made {
     Apply(Function, Symbol),
     /// The first on the surface's positive side, else the second.
     Select(usize, Symbol, Symbol),
+    /// The start of the cell that a place is in, or, counted from 1, a coefficient of the [spline](Knots)'s polynomial
+    /// there.
+    Piece(usize, Symbol, usize),
+}
+
+/// The cells of a spline and its coefficients.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Knots {
+    pub cells: Cells,
+    pub coefficients: Vec<Symbol>,
 }
 
 /// An elementary function.
@@ -100,6 +110,7 @@ pub(super) struct Recording {
     /// Its place in the order of operands, independent of earlier symbols.
     ranks: Vec<Rank>,
     known: HashMap<Made, Symbol>,
+    pub(super) knots: Vec<Knots>,
     /// The model looked at a value, which a recording does not have.
     pub(super) looked: bool,
 }
@@ -153,7 +164,7 @@ impl Recording {
         let varies = |s: Symbol| self.varies[s.0 as usize];
         let varies = match made {
             Made::Constant(_) | Made::Parameter(_) => false,
-            Made::Time | Made::State(_) | Made::Input(_) => true,
+            Made::Time | Made::State(_) | Made::Input(_) | Made::Piece(..) => true,
             Made::Neg(a) | Made::Apply(_, a) => varies(a),
             Made::Add(a, b) | Made::Sub(a, b) | Made::Mul(a, b) | Made::Div(a, b) => varies(a) || varies(b),
             Made::Select(_, a, b) => varies(a) || varies(b),
@@ -194,6 +205,7 @@ impl Recording {
             Made::Div(a, b) => inner(5, 0, [Some(a), Some(b)]),
             Made::Apply(function, a) => inner(6, function as u64, [Some(a), None]),
             Made::Select(j, a, b) => inner(7, j as u64, [Some(a), Some(b)]),
+            Made::Piece(part, place, knots) => inner(8, (knots * 5 + part) as u64, [Some(place), None]),
         }
     }
 
@@ -360,6 +372,17 @@ impl Recording {
         }
     }
 
+    /// The parts of a spline's polynomial: where its cell begins, and its coefficients.
+    fn piece(&mut self, place: Symbol, knots: Knots) -> [Symbol; 5] {
+        self.looked |= knots.coefficients.iter().any(|s| self.varies[s.0 as usize]);
+        let known = self.knots.iter().position(|other| *other == knots);
+        let number = known.unwrap_or_else(|| {
+            self.knots.push(knots);
+            self.knots.len() - 1
+        });
+        std::array::from_fn(|part| self.make(Made::Piece(part, place, number)))
+    }
+
     fn apply(&mut self, function: Function, a: Symbol) -> Symbol {
         match self.value(a) {
             Some(value) => self.constant(function.of(value)),
@@ -491,6 +514,12 @@ impl Real for Symbol {
         work.run::<Plain>()
     }
 
+    fn piece(self, cells: Cells, coefficient: &dyn Fn(usize) -> Symbol) -> SplinePiece<Symbol> {
+        let coefficients = (0..cells.coefficients).map(coefficient).collect();
+        let knots = Knots { cells, coefficients };
+        let [floor, powers @ ..] = RECORDING.with_borrow_mut(|r| r.piece(self, knots));
+        (floor, powers)
+    }
     fn from_lanes(mut lane: impl FnMut(usize) -> f64) -> Symbol {
         Symbol::constant(lane(0))
     }
