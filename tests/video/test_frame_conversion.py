@@ -18,7 +18,7 @@ from udd.film import Defects
 from udd.video.frame_conversion import HOW, RATIOS, Conversion, Samples
 from udd.video.reader import Film, Picture
 
-KINDS = [*((how, *ratio) for how in HOW[:2] for ratio in RATIOS), (HOW[2], 4, 5)]
+KINDS = [*((how, *ratio) for how in HOW[:2] for ratio in RATIOS), (HOW[1], 24, 25), (HOW[2], 4, 5)]
 
 
 def textures(count: int, seed: int = 0) -> np.ndarray:
@@ -69,8 +69,8 @@ def test_a_conversion_is_recognised_and_undone(how: str, sources: int, frames: i
 def test_frames_of_a_camera_have_no_conversion() -> None:
     for seed in range(4):
         assert recognised(pictures(textures(240, seed), 30.0)) is None
-    for period in (12.5, 24, 25, 50):
-        place = 20 + 15 * np.cos(2 * np.pi * np.arange(300) / period)
+    for period, phase in ((12.5, 0), (24, 0), (25, 0), (25, 0.3), (25, 0.5), (50, 0), (50, 0.25)):
+        place = 20 + 15 * np.cos(2 * np.pi * (np.arange(300) + phase) / period)
         x = np.arange(48) - place[:, None]
         swing = np.repeat(60 + 150 * np.exp(-(x**2) / 20)[:, None], 40, axis=1)
         assert recognised(pictures(swing, 25.0)) is None

@@ -13,8 +13,10 @@ from .reader import Picture, Plane
 
 Array = NDArray[np.float64]
 #: Frames of the camera per frames of the film: 24 in 30, 25 in 30, 30 in 60, 24 in 60, 25 in 60, ...
-#: Not 24 in 25: a pendulum with the period of such a cycle looks the same.
 RATIOS = ((4, 5), (5, 6), (1, 2), (2, 5), (5, 12), (3, 5), (2, 3), (1, 3), (12, 25))
+#: The same with one copy in a long cycle. A pendulum with the period of the cycle rests once in each, too,
+#: but then it turns back. Mixed frames of this ratio have the relation of any smooth motion.
+ONE_COPY = ((24, 25),)
 TELECINE = ((1.0, 0, 0, 0, 0), (0, 1.0, 0, 0, 0), (0, 0.5, 0.5, 0, 0), (0, 0, 0.5, 0.5, 0),
             (0, 0, 0, 1.0, 0), (0, 0, 0, 0, 1.0))  # fmt: skip
 HOW = ("mixed", "repeated", "mixed in halves")
@@ -23,6 +25,7 @@ MEMORY = 4e7  # bytes of them
 MOVING = 12.0  # codes by which a pixel changes that counts, root mean square
 FEWEST_PIXELS = 40
 FEWEST_CYCLES = 5
+GOES_ON = 0.25  # of the usual change over three frames, that there is across a copy
 CONTRAST = 0.15  # of the usual misfit that a relation between frames leaves in its phase
 CLEARLY = 0.3  # of the usual misfit, that it leaves in most cycles
 VOTES = 0.75  # share of the cycles
@@ -164,7 +167,7 @@ class Samples:
         each = [
             _recognised(Conversion(sources, frames, how, 0), band)
             for how in HOW
-            for sources, frames in (RATIOS if how != HOW[2] else RATIOS[:1])
+            for sources, frames in {HOW[0]: RATIOS, HOW[1]: RATIOS + ONE_COPY, HOW[2]: RATIOS[:1]}[how]
         ]
         good = [(kind.frames, kind.sources, contrast, kind) for contrast, kind in filter(None, each)]
         return min(good, default=(0, 0, 0.0, None), key=lambda c: c[:3])[3]  # most relations
@@ -196,4 +199,15 @@ def _recognised(kind: Conversion, band: Array) -> tuple[float, Conversion] | Non
     votes = float(np.mean(table[:, phase] < CLEARLY * np.median(table, axis=1))) if len(table) else 0.0
     if not (contrast < CONTRAST and votes > VOTES):
         return None
+    if (kind.sources, kind.frames) in ONE_COPY and not _goes_on(kind, phase, band):
+        return None
     return contrast, replace(kind, phase=phase)
+
+
+def _goes_on(kind: Conversion, phase: int, band: Array) -> bool:
+    """Return True if the motion goes on across a copy: the frames before and after it differ as usual."""
+    rows = np.argmax(kind.weights, axis=1)
+    before = int(np.flatnonzero(np.diff(rows) == 0)[0]) - 1
+    change = band[0, :-3] + band[0, 3:] - 2 * band[3, :-3]
+    across = change[(phase + before) % kind.frames :: kind.frames]
+    return bool(np.median(across) > GOES_ON * np.median(change))
