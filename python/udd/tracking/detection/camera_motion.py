@@ -21,6 +21,7 @@ from .survey import Survey
 Array = NDArray[np.float64]
 POINTS = 300  # of a picture that are tried
 CONTRAST = (0.005, 0.001)  # of the strongest point that the others have; the weaker ones if the first fail
+LARGE = 2e6  # pixels: larger pictures, as of 4K, are reduced by a whole factor
 LEARNED = 40  # pictures that show which of them belong to the background
 OFTEN = 0.35  # share of these in which such a point goes with the others
 FEWEST = 10  # points that must go the same way
@@ -260,11 +261,13 @@ class Background:
     def __init__(self, first: Plane, light: Array, contrast: float = CONTRAST[0]) -> None:
         import cv2
 
-        self.light, self.first = light.astype(np.float32), first
-        height, width = first.shape
+        self.light = light.astype(np.float32)
+        self.reduction = max(1, int((first.size / LARGE) ** 0.5))
+        self.first = self._reduced(first)
+        height, width = self.first.shape
         self.middle = complex(width - 1, height - 1) / 2
         spacing = max(5, round((height * width / 8000) ** 0.5))
-        corners = cv2.goodFeaturesToTrack(first, POINTS, contrast, spacing, blockSize=5)
+        corners = cv2.goodFeaturesToTrack(self.first, POINTS, contrast, spacing, blockSize=5)
         self._use(np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2))
         self.view = (1 + 0j, 0j)  # the last that is known
         self.failed = 0  # pictures in a row whose view was not found
@@ -293,13 +296,26 @@ class Background:
         for picture in pictures:
             view = None if unusable(picture) else self._seen(picture.y)
             rows.append(NOWHERE if view is None else view.row)
-        factor, shift, gain, sigma = zip(*rows, strict=True)
-        return _about_median(
-            CameraMotion(np.array(factor), np.array(shift), np.array(gain), np.array(sigma), self.middle)
-        )
+        factor, shift, gain, sigma = (np.array(x) for x in zip(*rows, strict=True))
+        n, corner = self.reduction, (0.5 + 0.5j) * (self.reduction - 1)  # the middle of a reduced pixel
+        shift = n * shift + corner * (1 - factor)
+        place = n * self.middle + corner
+        return _about_median(CameraMotion(factor, shift, gain, sigma * [n, n, 1], place))
+
+    def _reduced(self, y: Plane) -> Plane:
+        """Return the picture with each square of pixels averaged."""
+        import cv2
+
+        n = self.reduction
+        if n == 1:
+            return y
+        height, width = (size // n for size in y.shape)
+        part = y[: height * n, : width * n]
+        return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
     def _seen(self, y: Plane) -> _Seen | None:
         """One picture's view, and the points that show it; None where too few agree."""
+        y = self._reduced(y)
         for factor, shift, steadied in self._guesses(y):
             points = self._follow(steadied)
             if points is None:
@@ -314,7 +330,7 @@ class Background:
             if sigma[0] > UNSURE:
                 continue
             self.view, self.failed = (factor * factor_step, factor * away + shift), 0
-            seen = self._light(_seen_from(y, *self.view), self.points[used])
+            seen = self._light(y, self.points[used], *self.view)
             gain = float(np.median(seen / np.maximum(self.bright[used], 1.0)))
             return _Seen((*self.view, gain, sigma), used, rest)
         self.failed += 1
@@ -352,13 +368,16 @@ class Background:
         used = rows[agree.ravel() > 0]
         return used, there[used]
 
-    def _light(self, y: Plane, points: NDArray[np.float32]) -> Array:
-        """Mean light about points."""
+    def _light(self, y: Plane, points: NDArray[np.float32], factor: complex = 1, shift: complex = 0) -> Array:
+        """Return the mean light about points of the first picture, in a picture with another view."""
         import cv2
 
-        mean = cv2.blur(cv2.LUT(y, self.light), (PATCH, PATCH))
-        column, row = np.round(points).astype(int).T
-        return np.asarray(mean[np.clip(row, 0, y.shape[0] - 1), np.clip(column, 0, y.shape[1] - 1)], float)
+        near = np.arange(PATCH) - PATCH // 2
+        patch = (near[:, None] * 1j + near).ravel()
+        there = factor * (np.round(points).astype(float) @ [1, 1j])[:, None] + factor * patch + shift
+        at = np.ascontiguousarray(there.real, np.float32), np.ascontiguousarray(there.imag, np.float32)
+        seen = cv2.remap(y, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(self.light[seen].mean(axis=1), float)
 
 
 def _as_light(y: Plane, ratio: float) -> Plane:
