@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import CAMERA_COLUMNS
-from udd.video.reader import Film, Picture, Plane
+from udd.video.reader import Box, Film, Picture, Plane
 from udd.video.resampling import resampled
 from udd.video.srgb import code_of, light_of
 
@@ -41,12 +41,13 @@ class Correction:
     gain: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     full_range: bool = False
 
-    def __call__(self, picture: Picture) -> Picture:
-        """Return the corrected picture."""
+    def __call__(self, picture: Picture, box: Box | None = None) -> Picture:
+        """Return the corrected picture; if a box is given, it may be unsteady outside the box."""
         planes = [picture.y, picture.u, picture.v]
         if len(self.factor):
             k = min(picture.index, len(self.factor) - 1)
-            planes = _steadied(planes, complex(self.factor[k]), complex(self.shift[k]))
+            part = None if self.turns % 4 or self.mirrored else box
+            planes = _steadied(planes, complex(self.factor[k]), complex(self.shift[k]), part)
         if len(self.gain):
             k = min(picture.index, len(self.gain) - 1)
             planes = _as_bright(planes, float(self.gain[k]), self.full_range)
@@ -110,13 +111,19 @@ def correction_of(
     return Correction(turns, mirrored, full_range=full_range) if turns or mirrored else None
 
 
-def _steadied(planes: list[Plane], factor: complex, shift: complex) -> list[Plane]:
-    """Resample the planes; a sample of the colours lies between two pixels of the full picture."""
+def _steadied(planes: list[Plane], factor: complex, shift: complex, box: Box | None) -> list[Plane]:
+    """Resample the planes, or a box of them; a sample of a colour lies between two pixels of the picture."""
     half = 0.5 + 0.5j
+    shifts = (shift, *[(factor * half + shift - half) / 2] * 2)
     out = []
-    for plane, at in zip(planes, (shift, *[(factor * half + shift - half) / 2] * 2), strict=True):
+    for plane, at, size in zip(planes, shifts, (1, 2, 2), strict=True):
+        r0, r1, c0, c1 = (0, plane.shape[0], 0, plane.shape[1]) if box is None else (x // size for x in box)
+        at += factor * complex(c0, r0)
         view = np.array([[factor.real, -factor.imag, at.real], [factor.imag, factor.real, at.imag]])
-        out.append(np.clip(np.rint(resampled(plane, view)), 0, 255).astype(np.uint8))
+        moved = np.empty_like(plane) if box is None else plane.copy()
+        part = resampled(plane, view, (c1 - c0, r1 - r0))
+        moved[r0:r1, c0:c1] = np.clip(np.rint(part), 0, 255).astype(np.uint8)
+        out.append(moved)
     return out
 
 

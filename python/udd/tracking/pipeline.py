@@ -25,7 +25,7 @@ from udd.tracking.calibration.rim import Rim, outline
 from udd.tracking.calibration.scale import scale as size_of
 from udd.tracking.correction import Correction, applied, correction_of
 from udd.tracking.detection.camera_motion import CameraMotion, steadied
-from udd.tracking.detection.frame_flags import GONE, VAGUE, is_lost, lost
+from udd.tracking.detection.frame_flags import GONE, VAGUE, lost
 from udd.tracking.detection.recognition import placed, recognise
 from udd.tracking.detection.survey import Survey, survey
 from udd.tracking.geometry.pose import DiskAppearance, Pose
@@ -38,11 +38,12 @@ from udd.tracking.metric.film_clock import slow_parts, text_of
 from udd.tracking.metric.pixels_to_metres import Camera, left_the_wheels, metres, recount
 from udd.tracking.metric.pose_covariance import add_shared_errors, covariance
 from udd.tracking.metric.turns import count_turns
-from udd.tracking.passes.first_pass import TrackerState, follow
+from udd.tracking.passes.first_pass import MarkedDisk, TrackerState
+from udd.tracking.passes.frame_loop import follow
 from udd.tracking.passes.frame_quality import quality, remarks
 from udd.tracking.passes.pendulum_bob import track_bob
 from udd.tracking.passes.preparation import SHARP, prepare, recalibrate, rim_span, upward
-from udd.tracking.passes.second_pass import LONG, LocalMotion, drop_weak, interpolation_error, to_mid_exposure
+from udd.tracking.passes.second_pass import LocalMotion, drop_weak, interpolation_error, to_mid_exposure
 from udd.tracking.passes.second_pass import refine as second_pass
 from udd.tracking.passes.tag_tracking import follow_tags
 from udd.tracking.passes.tracks import Tracks
@@ -382,7 +383,7 @@ def _track_tags(film: Film, options: TrackOptions, progress: Progress, watch: Wa
     frames = film.promised or film.packets
     with _bar(film, frames, "track", progress) as bar:
         tell = _teller(film, None, frames, bar, watch)
-        tracks, state = follow_tags(film, film.pictures(), options, tell)
+        tracks, state = follow_tags(film, options, tell)
     return _with_doubts(film, _to_metres(film, _unwrap(tracks, state.exposure), state, options, None, False))
 
 
@@ -395,7 +396,7 @@ def _teller(
     def tell(picture: Picture, pose: Pose) -> None:
         bar.update()
         if watch is not None:
-            watch(TrackedFrame(picture, pose, shown, frames, film.full_range))
+            watch(TrackedFrame(film.corrected(picture), pose, shown, frames, film.full_range))
 
     return tell
 
@@ -501,7 +502,7 @@ def _upright(
         return _Upright(tracks, state, before, rim, turned, shared)
     if twice:  # a mark is placed best where it is looked for ("wobble": 7 rather than 35 micrometres)
         state = replace(state, look=stood.look)
-        tracks = second_pass(film.pictures(), state, stood.tracks, look_at=stood.look_at)
+        tracks = second_pass(film, state, stood.tracks, look_at=stood.look_at)
         stood = correct_wobble(tracks, state.look, turned, stood) or stood
     if rim is not None and options.calibrate.layout and look_over is not None:
         rim = _rim_upright(look_over, stood, state, rim, options)
@@ -532,15 +533,13 @@ def _rim_upright(
 
 def _follow(film: Film, state: TrackerState, frames: int, progress: Progress, watch: Watch | None) -> Tracks:
     with _bar(film, frames, "track", progress) as bar:
-        return follow(film.pictures(), state, _teller(film, state.look, frames, bar, watch))
+        (rows,) = follow(film, [MarkedDisk(state)], _teller(film, state.look, frames, bar, watch))
+        return Tracks.of(rows)
 
 
 def _refine(film: Film, state: TrackerState, tracks: Tracks, progress: Progress) -> Tracks:
-    streaks = (tracks.streak > LONG).any() or any(is_lost(flag) for flag in tracks.flag)
-    for streaks_only in (False, True) if streaks else (False,):
-        with _bar(film, len(tracks), "refine", progress) as bar:
-            tracks = second_pass(film.pictures(), state, tracks, lambda _: bar.update(), streaks_only)
-    return tracks
+    with _bar(film, len(tracks), "refine", progress) as bar:
+        return second_pass(film, state, tracks, lambda _: bar.update(), again=True)
 
 
 def pictures_at(

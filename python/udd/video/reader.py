@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .frame_conversion import Conversion
 
 Plane = NDArray[np.uint8]
+Box = tuple[int, int, int, int]  # rows from, to, columns from, to [pixels]
 Rates = float | Sequence[Sequence[float]]  # frames per second, or pairs of a frame and the rate from it on
 PATIENCE = 60.0  # s for which the decoder may be silent
 DECODER = str(Path(__file__).with_name("decoder_process.py"))
@@ -164,7 +165,8 @@ class Film:
             self.slower = ((0.0, captured / self.fps),)
             self.clock_note = f"times by the tag com.android.capture.fps: {captured:g} frames per second"
             self.fps = float(captured)
-        self.correct: Callable[[Picture], Picture] | None = None  # what is done to each picture
+        #: Correction of each picture, at least inside a box if one is given.
+        self.correct: Callable[[Picture, Box | None], Picture] | None = None
         self.tick: Callable[[], object] = lambda: None  # called for each picture that is read
         self.left_out: tuple[tuple[int, int], ...] = ()  # first and last frames of the parts without use
         self.conversion: Conversion | None = None  # what a converter did, to be undone
@@ -186,7 +188,16 @@ class Film:
         )
         return "; ".join(text for text in texts if text)
 
+    def corrected(self, picture: Picture, box: Box | None = None) -> Picture:
+        """Return a picture as it is after the film's correction, at least inside a box."""
+        return picture if self.correct is None else self.correct(picture, box)
+
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
+        """Yield all frames that decode, corrected; see :meth:`uncorrected`."""
+        for picture in self.uncorrected(since):
+            yield self.corrected(picture)
+
+    def uncorrected(self, since: float = 0.0) -> Iterator[Picture]:
         """Yield all frames that decode, in order of presentation, with increasing times.
 
         Frames are numbered from the first one that is yielded. If a converter changed the frame rate, the
@@ -206,9 +217,7 @@ class Film:
             since = 0.0  # the header's times are no help in seeking
         pictures = self._decoded(since)
         for picture in pictures if self.conversion is None else self.conversion.undo(pictures):
-            if self.slower:
-                picture = replace(picture, t=real_time(picture.t, self.slower))
-            yield picture if self.correct is None else self.correct(picture)
+            yield replace(picture, t=real_time(picture.t, self.slower)) if self.slower else picture
 
     def _decoded(self, since: float) -> Iterator[Picture]:
         """Yield the frames as they are coded, at the times of the header or of the given rates."""

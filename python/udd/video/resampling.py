@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 MIDWAY = (3 / 256, -25 / 256, 150 / 256, 150 / 256, -25 / 256, 3 / 256)  # value between two pixels
 
 
-def resampled(picture: NDArray[Any], view: NDArray[np.float64]) -> NDArray[np.float32]:
+def resampled(
+    picture: NDArray[Any], view: NDArray[np.float64], size: tuple[int, int] | None = None
+) -> NDArray[np.float32]:
     """Resample a picture with an affine map.
 
     OpenCV's cubic kernel displaces edges by up to 0.05 pixels, and its tables round places to 1/32 of a
@@ -23,22 +25,26 @@ def resampled(picture: NDArray[Any], view: NDArray[np.float64]) -> NDArray[np.fl
         Codes or light.
     view : ndarray (2, 3)
         Map from a pixel (u, v, 1) of the result to its place (u, v) in the picture.
+    size : (int, int), optional
+        Width and height of the result; those of the picture if not given.
 
     Returns
     -------
     ndarray of float32
-        Of the same shape; outside the picture the value of the nearest edge.
+        Outside the picture the value of the nearest edge.
     """
     import cv2
 
-    size = (picture.shape[1], picture.shape[0])
+    size = picture.shape[1::-1] if size is None else size
+    picture, view = _needed(picture, view, size)
     source = np.asarray(picture, np.float32)
     moves = view - np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     if not moves[:, :2].any() and not (moves[:, 2] % 1).any():  # whole pixels need no filter
         return _warped(source, view, size)
     kernel, none = np.array(MIDWAY, np.float32), np.ones(1, np.float32)
     before = len(MIDWAY) // 2 - 1
-    large = np.empty((2 * size[1], 2 * size[0], *picture.shape[2:]), np.float32)
+    height, width = source.shape[:2]
+    large = np.empty((2 * height, 2 * width, *source.shape[2:]), np.float32)
     for row, column in np.ndindex(2, 2):
         large[row::2, column::2] = cv2.sepFilter2D(
             source,
@@ -49,6 +55,17 @@ def resampled(picture: NDArray[Any], view: NDArray[np.float64]) -> NDArray[np.fl
             borderType=cv2.BORDER_REPLICATE,
         )
     return _warped(large, 2 * view, size)
+
+
+def _needed(
+    picture: NDArray[Any], view: NDArray[np.float64], size: tuple[int, int]
+) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    """Return the part of a picture that shows in the result, with the map to it."""
+    corners = np.array([[0, 0, 1], [size[0], 0, 1], [0, size[1], 1], [size[0], size[1], 1]]) @ view.T
+    limits = np.array(picture.shape[1::-1])
+    low = np.clip(np.floor(corners.min(axis=0)) - len(MIDWAY), 0, limits - 1).astype(int)
+    high = np.clip(np.ceil(corners.max(axis=0)) + len(MIDWAY), low + 1, limits).astype(int)
+    return picture[low[1] : high[1], low[0] : high[0]], view - np.column_stack([np.zeros((2, 2)), low])
 
 
 def _warped(

@@ -1,8 +1,8 @@
-"""The first pass: the disk is followed from frame to frame."""
+"""A disk with coloured marks as a target: fitted where it is predicted, or searched for by colours."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from udd.calibration_items import Estimate
 from udd.tracking.detection.candidates import candidates, classify
-from udd.tracking.detection.frame_flags import REPEATED, is_copy, lost, unusable
 from udd.tracking.geometry.contact_point import Contact
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT
 from udd.tracking.marks.pose_fit import Fit, align
-from udd.video.reader import Picture
+from udd.video.reader import Box, Picture
 
-from .tracks import FrameTrack, Tracks, found_in, lost_in
+from .frame_loop import Corrected, PoseSample, Prediction, Target
+from .tracks import FrameTrack, found_in, lost_in
 
 Array = NDArray[np.float64]
 CLOSE = [1.1, MISFIT, MISFIT, MISFIT]  # rounds from a prediction, good to a few pixels
@@ -30,6 +30,7 @@ FASTEST = 20.0  # rad/s: rates of turning tried when the last one is forgotten
 STREAK_STEP = 8.0  # pixels of streak by which those rates may miss
 BARE = np.concatenate([np.exp(2j * np.pi * np.arange(12) / 12), 0.5 * np.exp(2j * np.pi * np.arange(6) / 6)])
 SURROUNDINGS = 1.3  # of half a mark's diagonal: what is compared with the last frame
+BESIDE, ASIDE = 1.4, 16.0  # of the marks' reach and pixels: what belongs to the disk in a picture
 
 
 @dataclass(frozen=True)
@@ -44,67 +45,71 @@ class TrackerState:
     contact: Contact | None
     estimates: Mapping[str, Estimate]  # rows of the table of calibrations, for what is known by now
 
+    def box(self, poses: Sequence[Pose], streak: float, shape: tuple[int, ...]) -> Box:
+        """Return the part of a picture of this shape that shows the disk at some poses, to even numbers."""
+        at = self.look.lens.picture(np.array([pose.centre for pose in poses]))
+        margin = BESIDE * self.look.reach + streak + ASIDE
+
+        def side(x: Array, size: int) -> tuple[int, int]:
+            low, high = np.clip([x.min() - margin, x.max() + margin], 0, size).astype(int) & ~1
+            return int(low), int(high)
+
+        return *side(at.imag, shape[0]), *side(at.real, shape[1])
+
 
 @dataclass(frozen=True)
-class PoseSample:
-    """A frame in which the disk was tracked."""
+class Located:
+    """The marks fitted in a frame."""
 
-    t: float
+    fit: Fit
     pose: Pose
-    rate: float  # of turning [rad/s]
+    motion: Motion
 
 
-def follow(
-    pictures: Iterable[Picture],
-    state: TrackerState,
-    tick: Callable[[Picture, Pose], object] = lambda _picture, _pose: None,
-) -> Tracks:
-    """Track the disk through `pictures`; one row per picture, flagged where the disk is not tracked.
+class MarkedDisk(Target[Located, FrameTrack]):
+    """A disk with coloured marks, as a target of the loop over the frames."""
 
-    After each picture `tick` is called with the picture and the pose, NaN if the disk is not tracked.
-    """
-    frames: list[FrameTrack] = []
-    past: list[PoseSample] = []
-    last: NDArray[np.uint8] | None = None
-    for picture in pictures:
-        flag, fit, pose, motion = _track_frame(picture, state, past, last)
-        # a disk that is not seen, as behind a hand, does not move: no copy is recognised by it
-        last = picture.y if flag in ("", REPEATED) else None
-        streak = state.look.streak(motion)
-        if fit is None:
-            frames.append(lost_in(picture.t, flag, streak, len(state.look.marks)))
-        else:
-            frames.append(found_in(picture.t, fit, pose, streak, "fast"))
-            past = [*past[-2:], PoseSample(picture.t, pose, motion.spin)]
-        tick(picture, pose)
-    return Tracks.of(frames)
+    def __init__(self, state: TrackerState) -> None:
+        self.state, self.contact = state, state.contact
 
+    def surroundings(self, pose: Pose) -> tuple[NDArray[np.complex128], int, float]:
+        """Return the marks' places, the pixels about each, and their reach [pixels]."""
+        look = self.state.look
+        places = look.lens.picture(pose.centre + look.places * np.exp(1j * pose.angle))
+        return places, int(SURROUNDINGS * np.hypot(*look.marks[0].half)), look.reach
 
-def _track_frame(
-    picture: Picture, state: TrackerState, past: list[PoseSample], last: NDArray[np.uint8] | None
-) -> tuple[str, Fit | None, Pose, Motion]:
-    nowhere = Pose(complex(np.nan, np.nan), np.nan)
-    flag = unusable(picture)
-    if flag:
-        return flag, None, nowhere, Motion()
-    guess = predict(past, picture.t, state.contact)
-    if last is not None and guess is not None and repeats(picture.y, last, guess, past[-1].pose, state.look):
-        return REPEATED, None, nowhere, Motion()
-    if guess is not None and picture.t - past[-1].t < FRESH:
-        pose = Pose(guess.centre, guess.angle)
-        motion = _motion(past, guess, picture.t, state)
-        fit = fit_and_check(picture, state, pose, motion, CLOSE)
-        if fit is not None:
-            better = _motion(past, pose, picture.t, state)
-            if abs(state.look.streak(better) - state.look.streak(motion)) > 0.3:
-                motion = better
-                fit = fit_and_check(picture, state, pose, motion, [MISFIT, MISFIT]) or fit
-            return "", fit, pose, motion
-    best = _reacquire(picture, state, guess, past)
-    if best is None:
-        return lost("fewer than two marks agree"), None, nowhere, Motion()
-    fit, pose, motion = best
-    return "", fit, pose, motion
+    def box(self, poses: Sequence[Pose], shape: tuple[int, ...]) -> Box | None:
+        """Return the part of the picture in which the disk lies at these poses."""
+        return self.state.box(poses, 0.0, shape)
+
+    def attempts(
+        self, corrected: Corrected, picture: Picture, expected: Prediction | None
+    ) -> Iterator[Located | str]:
+        """Fit the marks where they are predicted, then start afresh from their colours."""
+        state = self.state
+        if expected is not None and expected.age < FRESH:
+            guess, past = expected.pose, expected.past
+            pose = Pose(guess.centre, guess.angle)
+            motion = _motion(past, guess, picture.t, state)
+            fit = fit_and_check(picture, state, pose, motion, CLOSE)
+            if fit is not None:
+                better = _motion(past, pose, picture.t, state)
+                if abs(state.look.streak(better) - state.look.streak(motion)) > 0.3:
+                    motion = better
+                    fit = fit_and_check(picture, state, pose, motion, [MISFIT, MISFIT]) or fit
+                yield Located(fit, pose, motion)
+        yield _reacquire(corrected(None), state, expected) or "fewer than two marks agree"
+
+    def sample(self, seen: Located, expected: Prediction | None, t: float) -> PoseSample:
+        """Return the pose of a result."""
+        return PoseSample(t, seen.pose, seen.motion.spin)
+
+    def row(self, t: float, flag: str, seen: Located | None) -> FrameTrack:
+        """Return the row of a frame."""
+        look = self.state.look
+        if seen is None:
+            return lost_in(t, flag, 0.0, len(look.marks))
+        return found_in(t, seen.fit, seen.pose, look.streak(seen.motion), "fast")
 
 
 def fit_and_check(
@@ -147,16 +152,15 @@ def _on_the_disk(picture: Picture, state: TrackerState, pose: Pose) -> bool:
     return bool(np.mean(np.abs(level - state.white) < 0.2 * state.white) > 0.7)
 
 
-def _reacquire(
-    picture: Picture, state: TrackerState, guess: Pose | None, past: list[PoseSample]
-) -> tuple[Fit, Pose, Motion] | None:
+def _reacquire(picture: Picture, state: TrackerState, expected: Prediction | None) -> Located | None:
     """Start afresh from blobs of the marks' colours, at several rates of turning where it is not known."""
     shape = picture.y.shape
     reach = state.look.reach
     box = (0, shape[0], 0, shape[1])
-    fresh = guess is not None and picture.t - past[-1].t < FRESH
-    if guess is not None and fresh:
-        r, at = 2.0 * reach, complex(state.look.lens.picture(guess.centre))
+    guess = None if expected is None else expected.pose
+    recent = expected if expected is not None and expected.age < FRESH else None
+    if recent is not None:
+        r, at = 2.0 * reach, complex(state.look.lens.picture(recent.pose.centre))
         box = (
             max(0, int(at.imag - r)),
             min(shape[0], int(at.imag + r)),
@@ -166,25 +170,25 @@ def _reacquire(
         if box[1] - box[0] < reach or box[3] - box[2] < reach:
             return None
     patches = classify(picture, state.colours, state.view, box)
-    best: tuple[float, Fit, Pose, Motion] | None = None
-    for start in candidates(patches, state.look, guess if fresh else None)[:MOST_TRIED]:
+    best: tuple[float, Located] | None = None
+    for start in candidates(patches, state.look, None if recent is None else guess)[:MOST_TRIED]:
         if guess is not None:
             start.angle += 2 * np.pi * round((guess.angle - start.angle) / (2 * np.pi))
-        for motion in _motions(past, start, picture.t, state, fresh):
+        for motion in _motions(recent, start, picture.t, state):
             pose = Pose(start.centre, start.angle)
             fit = fit_and_check(picture, state, pose, motion, FAR)
             if fit is not None:
                 score = sum(s.complete for s, u in zip(fit.sightings, fit.used, strict=True) if u and s)
                 if best is None or score > best[0]:
-                    best = (score, fit, pose, motion)
+                    best = (score, Located(fit, pose, motion))
         if best is not None:
             break
-    return None if best is None else best[1:]
+    return None if best is None else best[1]
 
 
-def _motions(past: list[PoseSample], pose: Pose, t: float, state: TrackerState, fresh: bool) -> list[Motion]:
-    if fresh:
-        return [_motion(past, pose, t, state)]
+def _motions(recent: Prediction | None, pose: Pose, t: float, state: TrackerState) -> list[Motion]:
+    if recent is not None:
+        return [_motion(recent.past, pose, t, state)]
     if state.exposure <= 0:
         return [Motion()]
     step = 2 * STREAK_STEP / (state.look.reach * state.exposure)
@@ -195,27 +199,7 @@ def _motions(past: list[PoseSample], pose: Pose, t: float, state: TrackerState, 
     return [Motion(0j, r * state.exposure, spin=r) for r in rates]
 
 
-def predict(past: list[PoseSample], t: float, contact: Contact | None) -> Pose | None:
-    """Predict the pose: the angle by extrapolation, the centre by rotation about the contact."""
-    if not past:
-        return None
-    last = past[-1]
-    dt = t - last.t
-    recent = [h for h in past if t - h.t < 0.5] or [last]
-    if len(recent) == 3 and dt > 1.6 * (last.t - recent[-2].t):
-        recent = recent[-2:]  # a parabola does not reach across a gap
-    times = np.array([h.t - t for h in recent])
-    weights = np.array([np.prod([-b / (a - b) for b in times if b != a]) for a in times])  # Lagrange at 0
-    if len(recent) == 1:
-        angle = last.pose.angle + last.rate * min(dt, 0.5)
-    else:
-        angle = float(weights @ np.array([h.pose.angle for h in recent]))
-    if contact is not None:
-        return Pose(contact.carry(last.pose.centre, angle - last.pose.angle, dt), angle)
-    return Pose(complex(weights @ np.array([h.pose.centre for h in recent])), angle)
-
-
-def _motion(past: list[PoseSample], pose: Pose, t: float, state: TrackerState) -> Motion:
+def _motion(past: Sequence[PoseSample], pose: Pose, t: float, state: TrackerState) -> Motion:
     """Movement during the exposure, from the derivative at `t` of the curve through the last poses."""
     points = [h for h in past[-2:] if t - h.t < 0.5]
     if not points:
@@ -243,14 +227,3 @@ def along_contact(state: TrackerState, pose: Pose, spin: float, change: float = 
     rate = contact.velocity(pose.centre, spin)
     bending = 1j * (change * (pose.centre - contact.place) + spin * rate)
     return Motion.of_rates(rate, spin, bending, change, state.exposure)
-
-
-def repeats(
-    y: NDArray[np.uint8], last: NDArray[np.uint8], guess: Pose, before: Pose, look: DiskAppearance
-) -> bool:
-    """Return True if a frame is a copy of the last although the disk should have moved."""
-    reach = look.reach
-    if abs(guess.centre - before.centre) + abs(guess.angle - before.angle) * reach < 1.0:
-        return False
-    places = look.lens.picture(before.centre + look.places * np.exp(1j * before.angle))
-    return is_copy(y, last, places, int(SURROUNDINGS * np.hypot(*look.marks[0].half)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,13 +15,14 @@ from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.correction import applied
 from udd.tracking.detection.bob import Background, Blob, BobColour, bob_colour, locate_bob, usual_area
 from udd.tracking.detection.camera_motion import CameraMotion
-from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, is_copy, lost, unread
+from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, unread
 from udd.tracking.detection.survey import Survey
 from udd.tracking.geometry.pose import Pose
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
 from .double_pendulum import with_lower_bob
+from .frame_loop import Corrected, PoseSample, Prediction, Target, follow
 from .frame_quality import remarks
 from .inserted_copies import inserted_copies
 
@@ -69,43 +70,50 @@ def track_bob(
     bobs = []
     for rgb, chroma in zip(options.layout.colours, options.layout.chroma, strict=True):
         colour = bob_colour(film, some, behind, BobColour.of(rgb, chroma, film.full_range))
-        bobs.append(BobTracker(behind, colour, usual_area(film, some, behind, colour)))
-    for picture in film.pictures():
-        for bob in bobs:
-            bob.follow(picture)
-        blob = bobs[0].rows[-1][2]
-        tick(picture, Pose(complex(np.nan, np.nan), np.nan) if blob is None else Pose(blob.centre, 0.0))
-    first = bob_path(film, bobs[0], options)
+        bobs.append(Bob(behind, colour, usual_area(film, some, behind, colour)))
+    paths = [bob_path(film, rows, options) for rows in follow(film, bobs, tick)]
+    upper = _pendulum(film, paths[0], options, behind.grain, camera)
     if len(bobs) == 1:
-        return _pendulum(film, first, options, behind.grain, camera)
-    upper, lower = _pendulum(film, first, options, behind.grain, camera), bob_path(film, bobs[1], options)
-    return _checked(film, with_lower_bob(upper, first.at, lower.at, lower.usual_area, str(film.path)))
+        return upper
+    lower = paths[1]
+    return _checked(film, with_lower_bob(upper, paths[0].at, lower.at, lower.usual_area, str(film.path)))
 
 
-class BobTracker:
-    """One bob, followed from picture to picture."""
+class Bob(Target[Blob, tuple[float, str, Blob | None]]):
+    """A pendulum's bob, as a target of the loop over the frames."""
+
+    least_move = MOVED
 
     def __init__(self, behind: Background, colour: BobColour, size: float) -> None:
         self.behind, self.colour, self.size = behind, colour, size
-        self.rows: list[tuple[float, str, Blob | None]] = []
-        self._last: NDArray[np.uint8] | None = None
-        self._path: list[complex] = []
-        self._areas: deque[float | None] = deque(maxlen=RECENT)  # of the last frames; None: not seen
+        self.areas: deque[float | None] = deque(maxlen=RECENT)  # of the last frames; None: not seen
 
-    def follow(self, picture: Picture) -> None:
-        """Find the bob in the next picture."""
-        blob, flag = None, _flag(picture, self.behind.picture)
-        if not flag:
-            blob = locate_bob(picture, self.behind, self.colour)
-            why = _unlike(0.0 if blob is None else blob.area, self.size, self._areas)
-            blob, flag = (None, lost(why)) if why else (blob, "")
-            self._areas.append(None if blob is None else blob.area)
-        if blob is not None and self._last is not None and _copy(picture.y, self._last, blob, self._path):
-            blob, flag = None, REPEATED
-        if blob is not None:
-            self._path = [*self._path[-2:], blob.centre]
-        self.rows.append((picture.t, flag, blob))
-        self._last = picture.y
+    def unusable(self, picture: Picture) -> str:
+        """Return the flag of a picture that shows nothing; empty if it may show something."""
+        some, usual = picture.y[::8, ::8], self.behind.picture.y[::8, ::8].astype(np.int16)
+        black = float(some.std()) < BLANK and float(np.abs(some - usual).mean()) > BLANK
+        return unread(picture) or (BLACK if black else "")
+
+    def surroundings(self, pose: Pose) -> tuple[NDArray[np.complex128], int, float]:
+        """Return the bob's place, the pixels about it, and no reach."""
+        return np.array([pose.centre]), int(1.5 * np.sqrt(self.size)), 0.0
+
+    def attempts(
+        self, corrected: Corrected, picture: Picture, expected: Prediction | None
+    ) -> Iterator[Blob | str]:
+        """Find the largest patch of the bob's colour."""
+        blob = locate_bob(picture, self.behind, self.colour)
+        why = _unlike(0.0 if blob is None else blob.area, self.size, self.areas)
+        self.areas.append(None if why or blob is None else blob.area)
+        yield why or blob or ""
+
+    def sample(self, seen: Blob, expected: Prediction | None, t: float) -> PoseSample:
+        """Return the place of a result."""
+        return PoseSample(t, Pose(seen.centre, 0.0))
+
+    def row(self, t: float, flag: str, seen: Blob | None) -> tuple[float, str, Blob | None]:
+        """Return time, flag and patch of a frame."""
+        return t, flag, seen
 
 
 def _unlike(area: float, size: float, recent: Iterable[float | None]) -> str:
@@ -119,19 +127,6 @@ def _unlike(area: float, size: float, recent: Iterable[float | None]) -> str:
     if area >= MOST * size or area >= TOO_MUCH * usual:
         return "the bob looks too large: it is blurred, or touches something of its colour"
     return ""
-
-
-def _flag(picture: Picture, behind: Picture) -> str:
-    some, usual = picture.y[::8, ::8], behind.y[::8, ::8].astype(np.int16)
-    black = float(some.std()) < BLANK and float(np.abs(some - usual).mean()) > BLANK
-    return unread(picture) or (BLACK if black else "")
-
-
-def _copy(y: NDArray[np.uint8], last: NDArray[np.uint8], blob: Blob, path: Sequence[complex]) -> bool:
-    """Return True if a frame repeats the last although the bob was moving."""
-    if len(path) < 3 or abs(2 * (path[-1] - path[-2]) - (path[-2] - path[-3])) < MOVED:
-        return False  # it was about to stand still
-    return is_copy(y, last, [blob.centre], int(1.5 * np.sqrt(blob.area)))
 
 
 def circle(points: NDArray[np.complex128]) -> Circle:
@@ -190,7 +185,7 @@ class BobPath:
         return float(np.median(self.area[np.isfinite(self.at)]))
 
 
-def bob_path(film: Film, bob: BobTracker, options: TrackOptions) -> BobPath:
+def bob_path(film: Film, rows: Sequence[tuple[float, str, Blob | None]], options: TrackOptions) -> BobPath:
     """Return the path of a bob, and the exposure by which it is blurred.
 
     Raises
@@ -198,7 +193,6 @@ def bob_path(film: Film, bob: BobTracker, options: TrackOptions) -> BobPath:
     TrackError
         The bob is seen in fewer than 10 frames.
     """
-    rows = bob.rows
     t = np.array([row[0] for row in rows])
     at = np.array([complex(np.nan, np.nan) if blob is None else blob.centre for *_, blob in rows])
     moments = np.array([np.full((2, 2), np.nan) if blob is None else blob.moments for *_, blob in rows])

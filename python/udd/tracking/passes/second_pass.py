@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from udd.tracking.detection.frame_flags import is_lost, lost
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT
-from udd.video.reader import Picture
+from udd.video.reader import Film, Picture
 
 from .first_pass import TrackerState, fit_and_check
 from .tracks import FrameTrack, Tracks, found_in, lost_in
@@ -49,33 +50,53 @@ class Local:
 
 
 def refine(
-    pictures: Iterable[Picture],
+    film: Film,
     state: TrackerState,
     first: Tracks,
     tick: Callable[[int], object] = lambda _: None,
-    streaks_only: bool = False,
+    again: bool = False,
     look_at: Callable[[int], DiskAppearance] | None = None,
 ) -> Tracks:
     """Fit every frame again from what the first pass says about it and its neighbours.
 
     A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
-    the first pass lost between two that it tracked is tried from these. `streaks_only`: frames with short
-    streaks stay as they are. `look_at` gives each frame's look where it is not always the same.
+    the first pass lost between two that it tracked is tried from these. `again`: frames with long streaks,
+    and lost ones, are fitted once more as soon as their neighbours are. `look_at` gives each frame's
+    appearance if it is not always the same.
     """
     better: dict[int, FrameTrack] = {}
+    best: dict[int, FrameTrack] = {}
     around = LocalMotion(first)
-    for k, picture in enumerate(pictures):
-        if k < len(first) and not (streaks_only and first.streak[k] < LONG and not first.flag[k]):
-            seen = state if look_at is None else replace(state, look=look_at(k))
-            frame = _refine_frame(picture, k, seen, around, first)
-            if frame is not None:
-                better[k] = frame
+    reach = NEAR * around.interval
+    waiting: deque[tuple[int, Picture]] = deque()
+
+    def refined_again(k: int, picture: Picture) -> None:
+        low, high = np.searchsorted(first.t, [first.t[k] - reach, first.t[k] + reach])
+        rows = range(int(low), min(int(high) + 1, len(first)))
+        part = first.part(rows.start, rows.stop)
+        part = part.with_frames({j - rows.start: better[j] for j in rows if j in better})
+        here = LocalMotion(part, around.interval)
+        frame = _refine_frame(film, picture, k - rows.start, state, here, part)
+        if frame is not None:
+            best[k] = frame
+
+    for k, picture in zip(range(len(first)), film.uncorrected(), strict=False):
+        seen = state if look_at is None else replace(state, look=look_at(k))
+        frame = _refine_frame(film, picture, k, seen, around, first)
+        if frame is not None:
+            better[k] = frame
+        if again and (frame.streak > LONG if frame else first.flag[k] or first.streak[k] > LONG):
+            waiting.append((k, picture))
+        while waiting and first.t[k] - first.t[waiting[0][0]] > reach:
+            refined_again(*waiting.popleft())
         tick(picture.index)
-    return first.with_frames(better)
+    while waiting:
+        refined_again(*waiting.popleft())
+    return first.with_frames(better | best)
 
 
 def _refine_frame(
-    picture: Picture, k: int, state: TrackerState, around: LocalMotion, tracks: Tracks
+    film: Film, picture: Picture, k: int, state: TrackerState, around: LocalMotion, tracks: Tracks
 ) -> FrameTrack | None:
     if tracks.flag[k] and not is_lost(tracks.flag[k]):
         return None
@@ -84,12 +105,12 @@ def _refine_frame(
         return None
     motion = here.motion(state.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
-    fit = fit_and_check(picture, state, pose, motion, KNOWN if here.tracked else FORESEEN)
-    reach = state.look.reach
     streak = state.look.streak(motion)
+    part = film.corrected(picture, state.box([pose], streak, picture.y.shape))
+    fit = fit_and_check(part, state, pose, motion, KNOWN if here.tracked else FORESEEN)
     if fit is None:
         return None
-    away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * reach
+    away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * state.look.reach
     if away > (APART if here.tracked else FORESEEN_APART) + APART_BY_STREAK * streak:
         return None
     if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.tracked:
@@ -155,11 +176,12 @@ def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array
 class LocalMotion:
     """A first pass, to be looked at around each of its frames."""
 
-    def __init__(self, tracks: Tracks) -> None:
+    def __init__(self, tracks: Tracks, interval: float | None = None) -> None:
         self.t = tracks.t
         self.centre, self.angle = tracks.centre, tracks.angle
         self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
-        self.interval = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+        usual = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+        self.interval = usual if interval is None else interval
 
     def _neighbours(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
         """Return the nearest frames on both sides, their distances in intervals, and True if k is tracked."""

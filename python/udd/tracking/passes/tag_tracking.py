@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.markers.layout import laid
-from udd.markers.tags import Tag, dictionary
+from udd.markers.tags import dictionary
 from udd.tracking.calibration.exposure import Exposure
 from udd.tracking.calibration.rolling_shutter import Readout
-from udd.tracking.detection.frame_flags import REPEATED, lost, unusable
+from udd.tracking.detection.frame_flags import lost
 from udd.tracking.detection.tag_corners import sharpened
 from udd.tracking.geometry.lens import calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Mark, Pose
@@ -22,7 +21,8 @@ from udd.tracking.marks.rigid_fit import solve
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
-from .first_pass import PoseSample, TrackerState, predict, repeats
+from .first_pass import SURROUNDINGS, TrackerState
+from .frame_loop import Corrected, PoseSample, Prediction, Target, follow
 from .preparation import exposure_estimate, lens_estimates, readout_estimate
 from .tracks import FrameTrack, Tracks, found_in, lost_in
 
@@ -35,21 +35,47 @@ OFF = 3.0  # pixels by which a corner may disagree
 FOR_LENS = 400  # frames at most from which tilt and lens are measured
 
 
-class Finder:
-    """Corners of the known tags in a picture (n, NaN where not seen)."""
+class TaggedDisk(Target[Complexes, tuple[float, str, Complexes]]):
+    """A disk with printed tags, as a target of the loop over the frames; a result is its corners (n,)."""
 
-    def __init__(self, tags: Sequence[Tag], options: TrackOptions, light: Array) -> None:
+    def __init__(self, film: Film, options: TrackOptions) -> None:
         import cv2
 
-        how = cv2.aruco.DetectorParameters()
+        tags, how = options.tags, cv2.aruco.DetectorParameters()
         how.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        self.light, self.cells = light.astype(np.float32), int(dictionary(tags[0].dictionary).markerSize) + 2
-        self.options, self.row = options, {tag.number: k for k, tag in enumerate(tags)}
+        self.light = film.light.astype(np.float32)
+        self.cells = int(dictionary(tags[0].dictionary).markerSize) + 2
+        self.options, self.row_of = options, {tag.number: k for k, tag in enumerate(tags)}
         self.detector = cv2.aruco.ArucoDetector(dictionary(tags[0].dictionary), how)
+        self.body, self.size = options.layout.unit, 1.0  # the last size [pixels]
 
-    def __call__(self, picture: Picture) -> Complexes:
-        """Look at one picture."""
-        out = np.full((len(self.row), 4), complex(np.nan, np.nan))
+    def surroundings(self, pose: Pose) -> tuple[Complexes, int, float]:
+        """Return the corners' places, the pixels about each, and their reach [pixels]."""
+        body = self.size * self.body
+        about = int(SURROUNDINGS * np.hypot(ABOUT, ABOUT))
+        return pose.centre + body * np.exp(1j * pose.angle), about, float(np.abs(body).max())
+
+    def attempts(
+        self, corrected: Corrected, picture: Picture, expected: Prediction | None
+    ) -> Iterator[Complexes | str]:
+        """Read the tags anywhere in the picture."""
+        at = self.corners(picture)
+        yield at if np.isfinite(at).any() else "no tag is seen"
+
+    def sample(self, seen: Complexes, expected: Prediction | None, t: float) -> PoseSample:
+        """Return the pose of a result, without perspective."""
+        pose, self.size = _rough(seen, self.body)
+        if expected is not None:
+            pose.angle += 2 * np.pi * round((expected.pose.angle - pose.angle) / (2 * np.pi))
+        return PoseSample(t, pose)
+
+    def row(self, t: float, flag: str, seen: Complexes | None) -> tuple[float, str, Complexes]:
+        """Return time, flag and corners of a frame."""
+        return t, flag, np.full(len(self.body), complex(np.nan, np.nan)) if seen is None else seen
+
+    def corners(self, picture: Picture) -> Complexes:
+        """Return the corners of the layout's tags in a picture (n,), NaN where not seen."""
+        out = np.full((len(self.row_of), 4), complex(np.nan, np.nan))
         y, away = picture.y, 0j
         if self.options.region is not None:
             inside = self.options.view(y.shape)
@@ -61,19 +87,16 @@ class Finder:
             return out.ravel()
         light = self.light[picture.y]
         for number, at in zip(np.ravel(numbers), corners, strict=False):
-            if int(number) in self.row:
+            if int(number) in self.row_of:
                 u, v = np.reshape(at, (4, 2)).T
                 sharp = sharpened(light, u + 1j * v + away, self.cells)
                 if sharp is not None:
-                    out[self.row[int(number)]] = sharp
+                    out[self.row_of[int(number)]] = sharp
         return out.ravel()
 
 
 def follow_tags(
-    film: Film,
-    pictures: Iterable[Picture],
-    options: TrackOptions,
-    tick: Callable[[Picture, Pose], object],
+    film: Film, options: TrackOptions, tick: Callable[[Picture, Pose], object]
 ) -> tuple[Tracks, TrackerState]:
     """Find the tags in every picture and lay one rigid body through their corners.
 
@@ -82,44 +105,16 @@ def follow_tags(
     TrackError
         The film is empty, or fewer than 10 frames show a tag.
     """
-    find, body = Finder(options.tags, options, film.light), options.layout.unit
-    seen: list[Complexes] = []
-    notes: list[tuple[float, str]] = []
-    last: NDArray[np.uint8] | None = None
-    shape = (film.size[1], film.size[0])
-    past: list[PoseSample] = []
-    rough = _rough_look(film, options)
-    for picture in pictures:
-        shape = (picture.y.shape[0], picture.y.shape[1])
-        at, flag = np.full(len(body), complex(np.nan, np.nan)), unusable(picture)
-        pose = Pose(complex(np.nan, np.nan), np.nan)
-        if not flag:
-            at = find(picture)
-            flag = "" if np.isfinite(at).any() else lost("no tag is seen")
-        if not flag:
-            pose, factor = _rough(at, body)
-            rough = replace(
-                rough, marks=[replace(m, place=factor * z) for m, z in zip(rough.marks, body, strict=True)]
-            )
-            guess = predict(past, picture.t, None)
-            if guess is not None and last is not None:
-                pose.angle += 2 * np.pi * round((guess.angle - pose.angle) / (2 * np.pi))
-                if repeats(picture.y, last, guess, past[-1].pose, rough):
-                    at[:], flag = complex(np.nan, np.nan), REPEATED
-            if not flag:
-                past = [*past[-2:], PoseSample(picture.t, pose, 0.0)]
-        last = picture.y
-        seen.append(at)
-        notes.append((picture.t, flag))
-        tick(picture, pose)
-    points = np.array(seen).reshape(-1, len(body))
-    if np.isfinite(points).any(axis=1).sum() < FEWEST:
+    (rows,) = follow(film, [TaggedDisk(film, options)], tick)
+    points = np.array([at for *_, at in rows]).reshape(-1, len(options.layout.unit))
+    frames = int(np.isfinite(points).any(axis=1).sum())
+    if frames < FEWEST:
         raise TrackError(
-            f"{film.path}: the layout's tags are read in {np.isfinite(points).any(axis=1).sum()} of "
+            f"{film.path}: the layout's tags are read in {frames} of "
             f"{len(points)} frames; at least {FEWEST} are needed. Show the whole tag with its white margin, "
             "sharp; check its dictionary and number"
         )
-    return _laid(points, notes, film, options, shape)
+    return _laid(points, [(t, flag) for t, flag, _ in rows], film, options)
 
 
 def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
@@ -129,20 +124,14 @@ def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
     return Pose(centre, float(np.angle(turn))), abs(turn)
 
 
-def _rough_look(film: Film, options: TrackOptions) -> DiskAppearance:
-    marks = [Mark(complex(z), (ABOUT, ABOUT), 0.0, 0.0) for z in options.layout.unit]
-    return DiskAppearance(marks, 0.0, 1.0, film.light, np.inf)
-
-
 def _laid(
     points: Complexes,
     notes: list[tuple[float, str]],
     film: Film,
     options: TrackOptions,
-    shape: tuple[int, int],
 ) -> tuple[Tracks, TrackerState]:
     """Lens, size and layout from all frames; then every frame's pose."""
-    body, wanted = options.layout.unit, options.calibrate
+    body, wanted, shape = options.layout.unit, options.calibrate, film.size[::-1]
     good = np.flatnonzero(np.isfinite(points).sum(axis=1) >= 4)
     some = good[:: max(1, len(good) // FOR_LENS)]
     bent = calibrate(points[some], shape, body, wanted.given("lens"), wanted.given("tilt"))

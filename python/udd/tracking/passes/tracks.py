@@ -65,6 +65,10 @@ class Tracks:
         """Frames with a pose."""
         return np.asarray(np.isfinite(self.information).all(axis=(1, 2)))
 
+    def part(self, first: int, end: int) -> Tracks:
+        """Return the tracks of consecutive frames."""
+        return Tracks(**{f.name: getattr(self, f.name)[first:end] for f in fields(self)})
+
     def without(self, those: NDArray[np.bool_], flag: str) -> Tracks:
         """Return tracks without the poses of some frames (n,), which get a flag if they have none."""
         changed = {
