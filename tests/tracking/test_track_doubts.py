@@ -24,6 +24,7 @@ from udd.errors import UddError
 from udd.film import Defects
 from udd.film.defects import real_times
 from udd.tracking.geometry.contact_point import pivot
+from udd.tracking.geometry.intervals import usual_interval
 from udd.tracking.metric.apparent_gravity import apparent_gravity
 from udd.tracking.metric.film_clock import _rational, slow_parts
 from udd.tracking.metric.turns import count_turns
@@ -124,6 +125,31 @@ def test_missing_frames_are_seen_by_the_drive(seconds: int, missing: Any, seed: 
     slower = tuple((float(stamps[part.first]), part.factor) for part in parts)
     again = np.array([real_time(float(stamp), slower) for stamp in stamps])
     assert len(parts) > 2 and np.abs(again - taken).max() < 0.04
+
+
+def test_a_hand_hides_no_missing_frames() -> None:
+    """Before this, all frames of such a film were taken as even: 12 mm off, in silence."""
+    taken = np.delete(np.arange(0, 8, 1 / 30), [20, 41, 42, 80, 111, 150, 190])
+    centre, angle, _ = seen(taken, 2)
+    centre[95:112], angle[95:112] = np.nan, np.nan
+    angle[112:] += 2 * np.pi  # turns across the gap are not counted yet
+    stamps = np.arange(len(taken)) / 30
+    parts = slow_parts(stamps, centre + 100 + 200j, angle, 0.08, SCALE)
+    slower = tuple((float(stamps[part.first]), part.factor) for part in parts)
+    again = np.array([real_time(float(stamp), slower) for stamp in stamps])
+    before, after = again[:95] - taken[:95], again[112:] - taken[112:]
+    # how many frames are missing behind the hand, the drive does not show
+    assert np.abs(before).max() < 0.005 and np.ptp(after) < 0.005 and abs(after[0]) < 0.04
+
+
+def test_a_film_mostly_in_slow_motion_has_no_gaps() -> None:
+    t = np.concatenate([np.arange(0, 2, 1 / 30), np.arange(2, 4, 1 / 240), np.arange(4, 6, 1 / 30)])
+    assert usual_interval(t) == pytest.approx(1 / 30)
+    assert usual_interval(np.delete(np.arange(300) / 30, [5, 60, 61])) == pytest.approx(1 / 30)
+    centre, angle, _ = seen(t, 1)
+    contact = pivot(t, centre, angle, np.ones(len(t), dtype=bool), 57.0)
+    assert contact is not None and abs(contact.place) < 0.3  # pixels
+    assert len(count_turns(t, centre, angle, contact.place, contact.drive, 57.0).doubtful) == 0
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.tracking.detection.survey import Moving
+from udd.tracking.geometry.intervals import usual_interval
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT, beyond_place, coverage, seen_at
 from udd.tracking.marks.pose_fit import align
@@ -158,7 +159,7 @@ def at_middle(
     if len(t) < 3:
         return centre, angle
     before, after = t[1:-1] - t[:-2], t[2:] - t[1:-1]
-    close = (np.maximum(before, after) < 2.5 * np.median(np.diff(t))).astype(float)
+    close = (np.maximum(before, after) < 2.5 * usual_interval(t)).astype(float)
     for x in (centre, angle):
         bend = 2 * ((x[2:] - x[1:-1]) / after - (x[1:-1] - x[:-2]) / before) / (before + after)
         shift = close * bend * open_for**2 / 24

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,7 +34,10 @@ STEADY = 0.2  # pixels: a camera that moves less is at rest
 AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
 PATCH = 5  # pixels about a point whose light is compared
 WINDOW = 15  # pixels
-KNOWN = 0.8  # share of the pictures whose view is known; with less, the points are not the background's
+KNOWN, ALL = (
+    0.8,
+    0.98,
+)  # share of the pictures whose view is known; with less, the points are not the background's
 PLACED, TURNED = 0.007, 0.05  # pixels, at the middle and at the corner: errors that change with the view
 AROUND = 2  # frames on each side that show whether the camera rests
 REST, RESTING = 20, 0.95  # frames that a rest lasts at least, and the share of them with the same view
@@ -222,16 +226,17 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     whole = [p for p in look_over.pictures if not unusable(p)]
     if not whole:
         return None
-    for contrast in CONTRAST:
-        background = Background(whole[0].y, film.light, contrast)
+    best, share = None, KNOWN
+    for contrast, part in product(CONTRAST, (0.0, 0.5, 1.0)):  # after a zoom another picture may show more
+        background = Background(whole[round(part * (len(whole) - 1))].y, film.light, contrast)
         seen = background.follow(whole[::2]) if background.learned(whole) else None
-        if seen is not None and seen.is_measured.mean() >= KNOWN:
+        if seen is not None and seen.is_measured.mean() >= share:
+            best, share = (background, seen), float(seen.is_measured.mean())
+        if share > ALL:
             break
-    else:
+    if best is None or (best[1].steady and best[1].as_bright):
         return None
-    if seen.steady and seen.as_bright:
-        return None
-    moved = background.follow(film.pictures()).rested()
+    moved = best[0].follow(film.pictures()).rested()
     still = moved.steady and moved.as_bright
     return None if still or moved.is_measured.mean() < KNOWN else moved
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from .intervals import usual_interval
+
 Array = NDArray[np.float64]
 WINDOW = 1.5  # s; over longer stretches what the constraint leaves out (slip) adds up
 SHORTEST = 0.3  # s
@@ -141,7 +143,7 @@ def windows(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     if len(t) < 2:
         return []
     out = []
-    longest = 2.5 * float(np.median(np.diff(t)))
+    longest = 2.5 * usual_interval(t)
     start: int | None = None
     for i in range(len(t) + 1):
         stop = i == len(t) or not good[i] or (start is not None and i > start and t[i] - t[i - 1] > longest)

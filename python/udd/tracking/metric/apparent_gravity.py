@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from udd.tracking.geometry.intervals import usual_interval
+
 Array = NDArray[np.float64]
 STANDARD = 9.81  # m/s^2
 TURN = 1.5  # rad: the disk turns by as much in a stretch over which torques are averaged
@@ -106,7 +108,7 @@ def _unbroken(t: Array, good: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Ranges of frames without gaps, long enough for a stretch or two."""
     if len(t) < 2:
         return []
-    usual = 2.5 * float(np.median(np.diff(t)))
+    usual = 2.5 * usual_interval(t)
     ends = np.flatnonzero(~good[1:] | ~good[:-1] | (np.diff(t) > usual)) + 1
     edges = [0, *ends.tolist(), len(t)]
     return [(a, b) for a, b in pairwise(edges) if b - a >= 2 * FRAMES and good[a:b].all()]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from udd.tracking.geometry.intervals import usual_interval
 from udd.tracking.geometry.pose import moved_by_pose
 from udd.tracking.passes.tracks import Tracks
 
@@ -56,7 +57,7 @@ def _jumps(tracks: Tracks, covariance: Array, camera: Camera) -> tuple[Array, Ar
     good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
     maps = moved_by_pose(-away)  # of a pose's error to that of c - p where the angle is taken out
     variance = np.einsum("nij,njk,nik->n", maps, covariance, maps)
-    usual = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+    usual = usual_interval(t) if len(t) > 1 else 1.0
     second, weights = np.full(len(t), np.nan + 0j), np.zeros((len(t), 3), dtype=complex)
     for k in range(1, len(t) - 1):
         three = slice(k - 1, k + 2)

@@ -25,6 +25,7 @@ SHORTEST = 8  # steps of a part that may show real time
 PENALTY = 40.0  # decrease of chi2 that a change of the clock must bring
 CHUNK = 3000  # steps that are cut into parts at once
 SMOOTH = 7  # steps over which a fall is recognised
+UNSEEN = 2  # frames between two that show the disk, beyond which these show no speed
 STOPPED = 0.02  # of the drive: with less, the disk is not driven
 NOISE = 0.1  # of the drive: speeds with more scatter show no clock
 ABOUT = 3  # frames on each side of a change, through which the angle is smooth in real time
@@ -80,6 +81,8 @@ def slow_parts(
         return []
     pivot = _pivot(t, centre, angle, good)
     speed = _speeds(t, centre - pivot, angle, good)
+    hidden = np.diff(good) > UNSEEN  # nobody knows how the disk turned meanwhile
+    speed[hidden] = median_filter(speed, SMOOTH, mode="nearest")[hidden]
     driven = np.flatnonzero(median_filter(speed, SMOOTH, mode="nearest") > STOPPED * np.median(np.abs(speed)))
     if len(driven) < 2 * WINDOW:
         return []

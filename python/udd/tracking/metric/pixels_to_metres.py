@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from udd.markers.layout import STANDARD
 from udd.measurement import Measurement
+from udd.tracking.geometry.intervals import usual_interval
 from udd.tracking.geometry.lens import PLAIN, Lens
 from udd.tracking.passes.tracks import Tracks
 
@@ -215,7 +216,7 @@ def _release(t: Array, values: Array, radius: float, drive: complex, unseen_afte
     at, turn, step = values[:, 0] + 1j * values[:, 1], np.diff(values[:, 2]), np.diff(t)
     swept = drive * step * np.exp(0.5j * turn) * np.sinc(turn / (2 * np.pi))
     off = at[1:] - (at[:-1] + swept) * np.exp(-1j * turn)
-    close = step < CLOSE * float(np.median(step))
+    close = step < CLOSE * usual_interval(t)
     if close.sum() < FEWEST:
         return float("inf")
     usual = float(np.median(np.abs(off[close])))
@@ -244,7 +245,7 @@ def recount(t: Array, angle: Array) -> tuple[Array, int]:
     seen = np.flatnonzero(np.isfinite(angle))
     if len(seen) < 4:
         return angle, doubtful
-    usual = float(np.median(np.diff(t)))
+    usual = usual_interval(t)
     for k in range(1, len(seen) - 2):
         i, j = seen[k], seen[k + 1]
         gap = t[j] - t[i]

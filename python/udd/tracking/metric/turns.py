@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from udd.tracking.geometry.intervals import usual_interval
+
 Array = NDArray[np.float64]
 SHORT = 3.5  # Usual intervals: in a shorter gap no turn is lost.
 SIDE, NEAR = 4, 0.12  # Frames, and seconds, on each side that show the rate of rotation.
@@ -59,7 +61,7 @@ def count_turns(
     if len(seen) < 2 * SIDE:
         return Turns(angle, np.empty(0, np.intp))
     usual, fastest = _usual_acceleration(t, angle), _fastest(t, angle)
-    gaps = np.flatnonzero(np.diff(t[seen]) > SHORT * float(np.median(np.diff(t))))
+    gaps = np.flatnonzero(np.diff(t[seen]) > SHORT * usual_interval(t))
     for k in gaps:
         i, j = seen[k], seen[k + 1]
         before, after = _rate(t, angle, seen[: k + 1], i), _rate(t, angle, seen[k + 1 :], j)
@@ -128,7 +130,7 @@ class _Way:
 
 def _rate(t: Array, angle: Array, seen: NDArray[np.intp], edge: int) -> float:
     """Rate of turning at a frame at the edge of a gap, by a parabola through those about it."""
-    usual = float(np.median(np.diff(t)))
+    usual = usual_interval(t)
     rows = seen[np.abs(t[seen] - t[edge]) < max((SIDE - 0.5) * usual, NEAR)]
     if len(rows) < 2:
         return float("nan")
@@ -138,8 +140,8 @@ def _rate(t: Array, angle: Array, seen: NDArray[np.intp], edge: int) -> float:
 
 def _usual_acceleration(t: Array, angle: Array) -> float:
     """Root mean square of the angular acceleration where the disk is seen, over steps of `STEP`."""
-    step = max(1, round(STEP / float(np.median(np.diff(t)))))
-    h = step * float(np.median(np.diff(t)))
+    step = max(1, round(STEP / usual_interval(t)))
+    h = step * usual_interval(t)
     second = angle[2 * step :] - 2 * angle[step:-step] + angle[: -2 * step]
     even = np.abs(t[2 * step :] - t[: -2 * step] - 2 * h) < 0.3 * h
     good = second[np.isfinite(second) & even]
@@ -149,5 +151,5 @@ def _usual_acceleration(t: Array, angle: Array) -> float:
 def _fastest(t: Array, angle: Array) -> float:
     """Nearly the fastest rate at which the disk is seen to turn."""
     rate = np.abs(np.diff(angle) / np.diff(t))
-    close = np.isfinite(rate) & (np.diff(t) < SHORT * float(np.median(np.diff(t))))
+    close = np.isfinite(rate) & (np.diff(t) < SHORT * usual_interval(t))
     return float(np.quantile(rate[close], 0.99)) if close.any() else 20.0

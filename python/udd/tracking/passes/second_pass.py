@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.tracking.detection.frame_flags import is_lost, lost
+from udd.tracking.geometry.intervals import usual_interval
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.localization import MISFIT
 from udd.video.reader import Film, Picture
@@ -180,7 +181,7 @@ class LocalMotion:
         self.t = tracks.t
         self.centre, self.angle = tracks.centre, tracks.angle
         self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
-        usual = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+        usual = usual_interval(self.t) if len(self.t) > 1 else 1.0
         self.interval = usual if interval is None else interval
 
     def _neighbours(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
