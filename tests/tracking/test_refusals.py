@@ -17,8 +17,8 @@ import cv2
 import udd
 from film_for_tests import write
 from udd.errors import UddError
+from udd.tracking.detection.bob import UsualArea
 from udd.tracking.detection.colour_blobs import COLOURS
-from udd.tracking.passes.pendulum_bob import _unlike
 
 Picture = NDArray[np.uint8]
 FRAMES = 14
@@ -99,5 +99,10 @@ def test_the_colour_of_what_moves_is_given(tmp_path: Path) -> None:
 
 def test_a_bob_that_is_not_used_says_why() -> None:
     """A blurred dot in full view was "not seen, or partly hidden"."""
-    assert _unlike(0.0, 70, [70]) == "the bob is not seen" and _unlike(68, 70, [70]) == ""
-    assert "too small" in _unlike(50, 70, [62]) and "too large" in _unlike(100, 70, [70])
+    usual, small = UsualArea(70, 0.01), UsualArea(70, 0.09)
+    assert usual.unlike(0.0, [70]) == "the bob is not seen" and usual.unlike(68, [70]) == ""
+    assert "too small" in usual.unlike(50, [62]) and "too large" in usual.unlike(100, [70])
+    # the area of a bob of nine pixels scatters
+    assert "too small" in usual.unlike(60, [70]) and "too large" in usual.unlike(82, [70])
+    assert small.unlike(60, [70]) == small.unlike(82, [70]) == ""
+    assert "too small" in small.unlike(40, [70]) and "too large" in small.unlike(100, [70])

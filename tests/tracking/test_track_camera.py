@@ -19,7 +19,8 @@ from udd.errors import UddError
 from udd.film import Defects
 from udd.measurement import read_measurement
 from udd.tracking import pictures_at, pixels
-from udd.tracking.detection.camera_motion import CameraMotion
+from udd.tracking.detection.camera_motion import Background, CameraMotion
+from udd.video.reader import Picture, light_of_codes
 
 COLOURS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))
 MARKS = [{"at": [0.0, 0.06], "colour": "purple"}, {"at": [0.02, -0.055], "colour": "cyan"}]
@@ -143,6 +144,14 @@ def test_a_resting_camera_has_its_mean_view() -> None:
     sway = 2.0 * np.sin(np.arange(n) / 4) + 0j
     hand = CameraMotion(np.ones(n, complex), sway, np.ones(n), sigma, middle)
     assert np.allclose(hand.rested().shift, sway, atol=1e-12)
+
+
+def test_a_picture_without_points_shows_no_motion() -> None:
+    grey = np.full((60, 80), 128, np.uint8)
+    background = Background(grey, light_of_codes(False))
+    assert not len(background.points)
+    chroma = np.full((30, 40), 128, np.uint8)
+    assert not background.learned([Picture(k, k / 25, grey, chroma, chroma) for k in range(5)])
 
 
 def test_a_plain_wall_shows_a_zoom(tmp_path: Path) -> None:

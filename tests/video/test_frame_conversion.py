@@ -18,7 +18,12 @@ from udd.film import Defects
 from udd.video.frame_conversion import HOW, RATIOS, Conversion, Samples
 from udd.video.reader import Film, Picture
 
-KINDS = [*((how, *ratio) for how in HOW[:2] for ratio in RATIOS), (HOW[1], 24, 25), (HOW[2], 4, 5)]
+KINDS = [
+    *((how, *ratio) for how in HOW[:2] for ratio in RATIOS),
+    (HOW[0], 24, 25),
+    (HOW[1], 24, 25),
+    (HOW[2], 4, 5),
+]
 
 
 def textures(count: int, seed: int = 0) -> np.ndarray:

@@ -78,6 +78,7 @@ CASES = (
     Case("24 frames mixed into 30", (0.05, 0.7, 0.03), {"fps": 30.0}, {"blended": 24.0}),
     Case("24 frames repeated into 30", (0.05, 0.7, 0.03), {"fps": 30.0}, {"copied": 24.0}),
     Case("24 frames repeated into 25", (0.05, 0.7, 0.03), {"fps": 25.0}, {"copied": 24.0}),
+    Case("24 frames mixed into 25", (0.05, 0.7, 0.03), {"fps": 25.0}, {"blended": 24.0}),
     Case("60 frames thinned to 24", (0.05, 0.7, 0.03), {"fps": 24.0}, {"copied": 60.0}),
     Case("rate changes, even stamps", (0.05, 0.7, 0.02), {"fps": 30.0}, {"clock": ((4.0, 0.8), (9.0, 1.0))}),
     Case("frames missing, even stamps", (0.05, 0.7, 0.02), {}, {"dropped": MISSING, "flat": True}),

@@ -14,9 +14,9 @@ from .reader import Picture, Plane
 Array = NDArray[np.float64]
 #: Frames of the camera per frames of the film: 24 in 30, 25 in 30, 30 in 60, 24 in 60, 25 in 60, ...
 RATIOS = ((4, 5), (5, 6), (1, 2), (2, 5), (5, 12), (3, 5), (2, 3), (1, 3), (12, 25))
-#: The same with one copy in a long cycle. A pendulum with the period of the cycle rests once in each, too,
-#: but then it turns back. Mixed frames of this ratio have the relation of any smooth motion.
-ONE_COPY = ((24, 25),)
+#: The same in a long cycle. A pendulum with the period of the cycle shows its frames' relation, too, but when
+#: it turns back.
+LONG_CYCLES = ((24, 25),)
 TELECINE = ((1.0, 0, 0, 0, 0), (0, 1.0, 0, 0, 0), (0, 0.5, 0.5, 0, 0), (0, 0, 0.5, 0.5, 0),
             (0, 0, 0, 1.0, 0), (0, 0, 0, 0, 1.0))  # fmt: skip
 HOW = ("mixed", "repeated", "mixed in halves")
@@ -30,7 +30,7 @@ CONTRAST = 0.15  # of the usual misfit that a relation between frames leaves in 
 CLEARLY = 0.3  # of the usual misfit, that it leaves in most cycles
 VOTES = 0.75  # share of the cycles
 STEADY = 0.999  # share of a frame of the camera that the film's frames determine
-NOISY = 4.0  # factor by which a separated frame may have more noise
+NOISY = 5.0  # factor by which a separated frame may have more noise
 NEGLIGIBLE = 0.01  # share of a frame
 
 
@@ -167,7 +167,7 @@ class Samples:
         each = [
             _recognised(Conversion(sources, frames, how, 0), band)
             for how in HOW
-            for sources, frames in {HOW[0]: RATIOS, HOW[1]: RATIOS + ONE_COPY, HOW[2]: RATIOS[:1]}[how]
+            for sources, frames in (RATIOS + LONG_CYCLES if how != HOW[2] else RATIOS[:1])
         ]
         good = [(kind.frames, kind.sources, contrast, kind) for contrast, kind in filter(None, each)]
         return min(good, default=(0, 0, 0.0, None), key=lambda c: c[:3])[3]  # most relations
@@ -199,13 +199,13 @@ def _recognised(kind: Conversion, band: Array) -> tuple[float, Conversion] | Non
     votes = float(np.mean(table[:, phase] < CLEARLY * np.median(table, axis=1))) if len(table) else 0.0
     if not (contrast < CONTRAST and votes > VOTES):
         return None
-    if (kind.sources, kind.frames) in ONE_COPY and not _goes_on(kind, phase, band):
+    if (kind.sources, kind.frames) in LONG_CYCLES and not _goes_on(kind, phase, band):
         return None
     return contrast, replace(kind, phase=phase)
 
 
 def _goes_on(kind: Conversion, phase: int, band: Array) -> bool:
-    """Return True if the motion goes on across a copy: the frames before and after it differ as usual."""
+    """Return True if the motion goes on across a copy or a half mixture: frames about it differ as usual."""
     rows = np.argmax(kind.weights, axis=1)
     before = int(np.flatnonzero(np.diff(rows) == 0)[0]) - 1
     change = band[0, :-3] + band[0, 3:] - 2 * band[3, :-3]

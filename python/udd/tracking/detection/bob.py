@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,10 @@ HUE, BRIGHTNESS = 2.0, 0.5  # weights of differences: lamps change the brightnes
 MOST_OTHER = 70.0  # weighted codes by which a pale bob may differ from the colour that was given
 THIN = 0.5  # of the radius of a pale bob: thinner parts, as a rod, do not belong to it
 FEWEST = 5  # pictures of the survey that must show the bob
+HALF_HIDDEN = 0.93  # share of the size in the last frames below which the middle is not the bob's
+TOO_MUCH = 1.15  # and above which something else of its colour is there
+LEAST, MOST = 0.87, 1.2  # the same of the size in the whole film
+WITHIN, WIDEST = 3.0, 0.35  # standard deviations that an area may be off, and a relative difference at most
 
 
 @dataclass(frozen=True)
@@ -133,8 +137,29 @@ def _moving(some: Sequence[Picture], behind: Background) -> str:
     return f"what moves has about the sRGB codes {said}: give these as bob if it is the bob"
 
 
-def usual_area(film: Film, some: Sequence[Picture], behind: Background, colour: BobColour) -> float:
-    """Return the bob's usual area [pixels].
+@dataclass(frozen=True)
+class UsualArea:
+    """Usual area of a bob [pixels], and its relative scatter, which is large for small bobs."""
+
+    size: float
+    scatter: float
+
+    def unlike(self, area: float, recent: Iterable[float | None]) -> str:
+        """Return why a patch is no whole bob, or an empty text; light changes its size slowly."""
+        if not area:
+            return "the bob is not seen"
+        seen = [a for a in recent if a is not None]
+        usual = float(np.median(seen)) if seen else self.size
+        spread = min(WITHIN * self.scatter, WIDEST)
+        if area <= min(LEAST, 1 - spread) * self.size or area <= min(HALF_HIDDEN, 1 - spread) * usual:
+            return "the bob looks too small: it is partly hidden, or blurred"
+        if area >= max(MOST, 1 + spread) * self.size or area >= max(TOO_MUCH, 1 + spread) * usual:
+            return "the bob looks too large: it is blurred, or touches something of its colour"
+        return ""
+
+
+def usual_area(film: Film, some: Sequence[Picture], behind: Background, colour: BobColour) -> UsualArea:
+    """Return the bob's usual area and its scatter.
 
     Raises
     ------
@@ -145,7 +170,8 @@ def usual_area(film: Film, some: Sequence[Picture], behind: Background, colour: 
     areas = [blob.area for blob in blobs_seen if blob is not None]
     if len(areas) < FEWEST:
         raise TrackError(f"{film.path}: no bob of that colour moves in this film; {_moving(some, behind)}")
-    return float(np.median(areas))
+    size = float(np.median(areas))
+    return UsualArea(size, 1.48 * float(np.median(np.abs(np.array(areas) / size - 1))))
 
 
 def locate_bob(picture: Picture, behind: Background, colour: BobColour) -> Blob | None:

@@ -283,6 +283,8 @@ class Background:
 
     def learned(self, pictures: Sequence[Picture]) -> bool:
         """Keep the points that go with most others in most pictures; False if there are too few."""
+        if len(self.points) < FEWEST:
+            return False
         votes, squares, count = np.zeros(len(self.points)), np.zeros(len(self.points)), 0
         for picture in pictures[:: max(1, len(pictures) // LEARNED)]:
             view = self._seen(picture.y)
@@ -377,6 +379,8 @@ class Background:
         """Return the mean light about points of the first picture, in a picture with another view."""
         import cv2
 
+        if not len(points):
+            return np.empty(0)
         near = np.arange(PATCH) - PATCH // 2
         patch = (near[:, None] * 1j + near).ravel()
         there = factor * (np.round(points).astype(float) @ [1, 1j])[:, None] + factor * patch + shift

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +13,17 @@ from numpy.typing import NDArray
 from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.correction import applied
-from udd.tracking.detection.bob import Background, Blob, BobColour, bob_colour, locate_bob, usual_area
+from udd.tracking.detection.bob import (
+    Background,
+    Blob,
+    BobColour,
+    UsualArea,
+    bob_colour,
+    locate_bob,
+    usual_area,
+)
 from udd.tracking.detection.camera_motion import CameraMotion
-from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, unread
+from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, lost, unread
 from udd.tracking.detection.survey import Survey
 from udd.tracking.geometry.pose import Pose
 from udd.tracking.options import TrackOptions
@@ -27,12 +35,11 @@ from .frame_quality import remarks
 from .inserted_copies import inserted_copies
 
 Array = NDArray[np.float64]
-HALF_HIDDEN = 0.93  # share of the size in the last frames below which the middle is not the bob's
-TOO_MUCH = 1.15  # and above which something else of its colour is there
-LEAST, MOST = 0.87, 1.2  # the same of the size in the whole film
 RECENT = 5  # frames
 ROUND = 0.03  # of the radius: a path that is off by more is no circle
 WANDERS = 0.003  # of the radius: nor is one with so different distances in one direction ...
+ASTRAY = 8.0  # times the usual distance from the path, beyond the bob's radius: something else
+PLACED = 0.5  # pixels: a small bob's middle is known no better
 SCATTERS = 4.0  # ... if that is so many times the frames' own scatter
 BENDS = 6  # degree of the polynomial by which lens and tilt change the distance
 FEWEST = 10  # frames that show the bob
@@ -84,8 +91,8 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
 
     least_move = MOVED
 
-    def __init__(self, behind: Background, colour: BobColour, size: float) -> None:
-        self.behind, self.colour, self.size = behind, colour, size
+    def __init__(self, behind: Background, colour: BobColour, usual: UsualArea) -> None:
+        self.behind, self.colour, self.usual = behind, colour, usual
         self.areas: deque[float | None] = deque(maxlen=RECENT)  # of the last frames; None: not seen
 
     def unusable(self, picture: Picture) -> str:
@@ -96,14 +103,14 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
 
     def surroundings(self, pose: Pose) -> tuple[NDArray[np.complex128], int, float]:
         """Return the bob's place, the pixels about it, and no reach."""
-        return np.array([pose.centre]), int(1.5 * np.sqrt(self.size)), 0.0
+        return np.array([pose.centre]), int(1.5 * np.sqrt(self.usual.size)), 0.0
 
     def attempts(
         self, corrected: Corrected, picture: Picture, expected: Prediction | None
     ) -> Iterator[Blob | str]:
         """Find the largest patch of the bob's colour."""
         blob = locate_bob(picture, self.behind, self.colour)
-        why = _unlike(0.0 if blob is None else blob.area, self.size, self.areas)
+        why = self.usual.unlike(0.0 if blob is None else blob.area, self.areas)
         self.areas.append(None if why or blob is None else blob.area)
         yield why or blob or ""
 
@@ -114,19 +121,6 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
     def row(self, t: float, flag: str, seen: Blob | None) -> tuple[float, str, Blob | None]:
         """Return time, flag and patch of a frame."""
         return t, flag, seen
-
-
-def _unlike(area: float, size: float, recent: Iterable[float | None]) -> str:
-    """Return why a patch is no whole bob, or an empty text; light changes its size slowly."""
-    if not area:
-        return "the bob is not seen"
-    seen = [a for a in recent if a is not None]
-    usual = float(np.median(seen)) if seen else size
-    if area <= LEAST * size or area <= HALF_HIDDEN * usual:
-        return "the bob looks too small: it is partly hidden, or blurred"
-    if area >= MOST * size or area >= TOO_MUCH * usual:
-        return "the bob looks too large: it is blurred, or touches something of its colour"
-    return ""
 
 
 def circle(points: NDArray[np.complex128]) -> Circle:
@@ -253,7 +247,8 @@ def _pendulum(
     unsure = options.pivot is None and path.sigma[0] > SURE * path.radius
     if options.pivot is None:
         _check_hanging(film, at[seen], path, off, unsure)
-    if off > ROUND * path.radius or wanders > (0.0 if unsure else WANDERS * path.radius):
+    wide = max(WANDERS * path.radius, PLACED)
+    if off > ROUND * path.radius or wanders > (0.0 if unsure else wide):
         off = max(off, wanders)
         raise TrackError(
             f"{film.path}: the bob's path is no circle ({off:.1f} pixels off one of {path.radius:.0f}): is "
@@ -271,6 +266,13 @@ def _pendulum(
     else:
         radius = path.radius
     rest = np.abs(at - pivot) - radius
+    astray = seen & (np.abs(rest) > np.sqrt(bob.usual_area / np.pi) + ASTRAY * off)
+    at[astray] = complex(np.nan, np.nan)
+    flag = [
+        lost("what has the bob's colour is not on its path") if a else f
+        for a, f in zip(astray, flag, strict=True)
+    ]
+    seen = np.isfinite(at)
     # a mistake along the path is as large as one across it, which the circle shows
     spread = max(1.48 * float(np.median(np.abs(rest[seen] - np.median(rest[seen])))), 0.01)
     t, flag = inserted_copies(t, at, flag, spread)
