@@ -13,7 +13,7 @@ from udd.measurement import Measurement
 from udd.models.formula_model import FormulaModel
 
 from .observation_inverse import inverted
-from .sensor import roughness
+from .sensor import NO_NOISE, roughness
 
 Array = NDArray[np.float64]
 
@@ -186,7 +186,7 @@ def checked_start(model: FormulaModel | None, state0: object) -> dict[str, float
 
 def typical_noise(values: Array) -> Array:
     """Estimate a measurement's noise from its roughness, if it does not state one."""
-    result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + 1e-300)
+    result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + NO_NOISE)
     return result
 
 

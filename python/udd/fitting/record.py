@@ -21,7 +21,16 @@ from udd.models.formula_model import FormulaModel
 
 from .continuous import angles_of
 from .formula_models import checked_start, driven, guessed, slope, typical_noise
-from .sensor import few_readings, frame_noise, is_encoder, lattice, moving, noise_by_size, stated_noise
+from .sensor import (
+    NO_NOISE,
+    few_readings,
+    frame_noise,
+    is_encoder,
+    lattice,
+    moving,
+    noise_by_size,
+    stated_noise,
+)
 
 Array = NDArray[np.float64]
 
@@ -31,6 +40,7 @@ _FEWEST = 10  # Frames of a fit.
 _FEWEST_OF_SEVERAL = 4  # The same of each of several records. Start states use up fewer.
 _SHORT = 30  # A record with fewer frames hardly shows its noise.
 _LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
+_OF_FRAMES = ("t", "seen", "sigma", "rho", "states", "odd", "row", "film")  # arrays with a row for each frame
 _CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
 
 
@@ -78,19 +88,8 @@ class Record(OneLine):
     def part(self, frames: slice | NDArray[Any]) -> Record:
         """Select frames by a slice, a mask or increasing numbers; only consecutive ones stay linked."""
         chosen = np.arange(len(self.t))[frames]
-        follow = np.diff(chosen) == 1
-        return replace(
-            self,
-            t=self.t[chosen],
-            seen=self.seen[chosen],
-            sigma=self.sigma[chosen],
-            rho=self.rho[chosen],
-            linked=self.linked[chosen[:-1]] & follow,
-            states=self.states[chosen],
-            odd=self.odd[chosen],
-            row=self.row[chosen],
-            film=self.film[chosen],
-        )
+        of_frames = {name: getattr(self, name)[chosen] for name in _OF_FRAMES}
+        return replace(self, linked=self.linked[chosen[:-1]] & (np.diff(chosen) == 1), **of_frames)
 
     @property
     def origin(self) -> float:
@@ -153,7 +152,16 @@ def record_of(
             raise FitError(f"got {number} but {len(given)} {what}; expected {expected}")
     alone = count == 1
     records = [_record_of(*arguments, alone) for arguments in zip(measurements, models, starts, strict=True)]
-    return _joined(records if alone else _together(measurements, records))
+    result = _joined(records if alone else _together(measurements, records))
+    if (result.sigma <= NO_NOISE).any():
+        frame, channel = np.argwhere(result.sigma <= NO_NOISE)[0]
+        name = (models[0].channels if isinstance(models[0], FormulaModel) else measurements[0].names)[channel]
+        where = "" if alone else f" of measurement {result.film[frame]}"
+        raise FitError(
+            f"{name} has a single value in all rows{where}, which does not show its noise: "
+            f"leave it out, or state the noise"
+        )
+    return result
 
 
 def _together(measurements: Sequence[Measurement], records: Sequence[Record]) -> list[Record]:
@@ -176,7 +184,7 @@ def _together(measurements: Sequence[Measurement], records: Sequence[Record]) ->
     if len(short) < 2 or len({record.seen.shape[1] for record in records}) > 1:
         return list(records)
     shown = np.array([[_median(records[k], c) for c in range(records[0].seen.shape[1])] for k in short])
-    typical = np.sqrt((shown**2).sum(axis=0) / np.maximum((shown > 0.0).sum(axis=0), 1))
+    typical = np.sqrt((shown**2).sum(axis=0) / np.maximum((shown > NO_NOISE).sum(axis=0), 1))
     return [
         replace(record, sigma=np.where(record.observed & (typical > 0.0), typical, record.sigma))
         if k in short
@@ -243,18 +251,16 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
     full[np.ix_(there, places)] = np.nan_to_num(read)
     sigma = np.full((len(t), len(names)), np.inf)
     rho = np.tile(np.eye(len(names)), (len(t), 1, 1))
-    if measurement.sigma is None:
-        sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, read), np.inf)
-    else:
-        stated_sigma = np.where(present, measurement.sigma[row[there]], np.inf)
-        for column, noise, read_there in zip(read.T, stated_sigma.T, present.T, strict=True):
-            noise[read_there] = stated_noise(column[read_there], noise[read_there])
-        sigma[np.ix_(there, places)] = stated_sigma
-        if measurement.rho is not None:
-            covariance, stated = measurement.covariance()[row[there]], measurement.sigma[row[there]]
-            observed_pairs = present[:, :, None] & present[:, None, :]
-            correlation = covariance / (stated[:, :, None] * stated[:, None, :])
-            rho[np.ix_(there, places, places)] = np.where(observed_pairs, correlation, np.eye(len(columns)))
+    stated = None if measurement.sigma is None else measurement.sigma[row[there]]
+    noise = np.where(present, _noise_of(measurement, read) if stated is None else stated, np.inf)
+    if stated is not None:
+        for column, sd, read_there in zip(read.T, noise.T, present.T, strict=True):
+            sd[read_there] = stated_noise(column[read_there], sd[read_there])
+    sigma[np.ix_(there, places)] = noise
+    if stated is not None and measurement.rho is not None:
+        observed_pairs = present[:, :, None] & present[:, None, :]
+        correlation = measurement.covariance()[row[there]] / (stated[:, :, None] * stated[:, None, :])
+        rho[np.ix_(there, places, places)] = np.where(observed_pairs, correlation, np.eye(len(columns)))
     guess = np.column_stack([_joined_up(t, t[there], column) for column in read.T])
     typical = np.array([np.median(column[np.isfinite(column)]) for column in sigma[:, places].T])
     odd = odd_frames(guess, typical, linked)
@@ -262,10 +268,11 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
         channel[odd] = _between(odd, channel)
     film = np.zeros(len(t), dtype=np.int64)
     if formula_model:
-        noise = dict(zip(columns, typical.tolist(), strict=True))
-        states = guessed(formula_model, t, dict(zip(columns, guess.T, strict=True)), linked, start, noise)
-    else:
-        states = _states(t, guess, linked)
+        typical_noises = dict(zip(columns, typical.tolist(), strict=True))
+        seen_guess = dict(zip(columns, guess.T, strict=True))
+        states = guessed(formula_model, t, seen_guess, linked, start, typical_noises)
+    else:  # the rate of the angle from neighbouring frames: only a start, data are never differentiated
+        states = np.column_stack([slope(t, guess[:, -1], linked), guess])
     return Record(t, full, sigma, rho, linked, states, odd, row, film, (origin,))
 
 
@@ -320,18 +327,10 @@ def _joined(records: Sequence[Record]) -> Record:
     if len({record.seen.shape[1] for record in records}) > 1:
         raise FitError("measurements in a joint fit must be of the same kind of body; fit them separately")
     links = [np.append(record.linked, False) for record in records]
-    return Record(
-        t=np.concatenate([r.t for r in records]),
-        seen=np.concatenate([r.seen for r in records]),
-        sigma=np.concatenate([r.sigma for r in records]),
-        rho=np.concatenate([r.rho for r in records]),
-        linked=np.concatenate(links)[:-1],
-        states=np.concatenate([r.states for r in records]),
-        odd=np.concatenate([r.odd for r in records]),
-        row=np.concatenate([r.row for r in records]),
-        film=np.concatenate([np.full(len(r.t), film, dtype=np.int64) for film, r in enumerate(records)]),
-        origins=tuple(origin for r in records for origin in r.origins),
-    )
+    arrays = {name: np.concatenate([getattr(r, name) for r in records]) for name in _OF_FRAMES}
+    arrays["film"] = np.concatenate([np.full(len(r.t), k, dtype=np.int64) for k, r in enumerate(records)])
+    origins = tuple(origin for r in records for origin in r.origins)
+    return Record(linked=np.concatenate(links)[:-1], origins=origins, **arrays)
 
 
 def _fill(
@@ -383,11 +382,3 @@ def _between(odd: NDArray[np.bool_], x: Array) -> Array:
     """Interpolate the outliers from the other frames."""
     number = np.arange(len(x), dtype=np.float64)
     return _akima(number[odd], number[~odd], x[~odd])
-
-
-def _states(t: Array, guess: Array, linked: NDArray[np.bool_]) -> Array:
-    """Guess the states: the rate of the angle from neighbouring frames, the rest as observed.
-
-    It is only the estimator's start; the estimator never differentiates data.
-    """
-    return np.column_stack([slope(t, guess[:, -1], linked), guess])

@@ -15,6 +15,8 @@ from udd.models.profile import SensorProfile
 
 Array = NDArray[np.float64]
 
+#: Noise of a column with a single value, which does not show it.
+NO_NOISE = 1e-300
 _FEW = 8  # Gaps between values that are needed to detect a lattice.
 _SAME = 1e-7  # Share of the range below which two values are equal.
 # Tolerance of gaps relative to the step, and the share of gaps that must be within it.
@@ -101,8 +103,8 @@ def stated_noise(values: Array, sigma: Array) -> Array:
 
 def few_readings(values: Array) -> Array:
     """Compute :func:`frame_noise` of an encoder with too few distinct readings to show a lattice."""
-    step = float(np.diff(np.unique(values)).min())
-    return _shared(values, np.full(len(values), step / math.sqrt(12.0)), step)
+    step = float(np.diff(np.unique(values)).min(initial=np.ptp(values)))
+    return np.maximum(_shared(values, np.full(len(values), step / math.sqrt(12.0)), step), NO_NOISE)
 
 
 def repeats(values: Array, step: float) -> NDArray[np.int64]:
