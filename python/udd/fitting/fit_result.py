@@ -248,8 +248,8 @@ class Fit(Drawable):
         if factor == 1.0:
             return self
         errors = {name: factor * error for name, error in self.errors.items()}
-        widened = factor * self.widened
-        result = replace(self, errors=errors, covariance=factor**2 * self.covariance, widened=widened)
+        covariance, widened = factor**2 * self.covariance, factor * self.widened
+        result = replace(self, errors=errors, covariance=covariance, widened=widened)
         result.__dict__["doubts"] = self.doubts
         return result
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -59,9 +60,8 @@ def free_parameters(
     sensor = model.profile.sensor
     camera_priors = {**sensor.camera, **({} if sensor.clock is None else {"clock": sensor.clock})}
     wanted = list(camera_priors) if camera is True else [] if camera is False else names_of("camera", camera)
-    twice = {name for name in [*names, *wanted] if [*names, *wanted].count(name) > 1}
-    if twice:
-        raise FitError(f"{', '.join(sorted(twice))} is named twice; name it once")
+    if twice := sorted(name for name, count in Counter([*names, *wanted]).items() if count > 1):
+        raise FitError(f"{', '.join(twice)} is named twice; name it once")
     film_specific = set(model.profile.fit.each if each is None else names_of("each", each))
     for name in [*names, *(film_specific if each is not None else ())]:
         if name not in values:
@@ -165,8 +165,5 @@ def _with_priors(free: list[Free], given: dict[str, tuple[float, float]]) -> tup
         raise FitError(
             f"priors has {', '.join(sorted(unknown))}, which is not free; add it to free or drop it"
         )
-    result = []
-    for f in free:
-        mean, sd = given.get(f.name, given.get(f.name.split("[")[0], (f.mean, f.sd)))
-        result.append(replace(f, mean=mean, sd=sd))
-    return tuple(result)
+    chosen = (given.get(f.name, given.get(f.name.split("[")[0], (f.mean, f.sd))) for f in free)
+    return tuple(replace(f, mean=mean, sd=sd) for f, (mean, sd) in zip(free, chosen, strict=True))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,35 +48,29 @@ def predicted(
     ndarray (k, h, m)
         NaN after the point at which the model's solution diverges.
     """
+
+    def run(rows: slice, at: Array) -> Array:
+        return _core.predict(models[0], sets, film[rows].tolist(), t0[rows], states[rows], at)
+
     try:
-        return _core.predict(models[0], sets, film.tolist(), t0, states, times)
+        return run(slice(None), times)
     except FitError:
-        if len(t0) > 1:
-            rows = [slice(k, k + 1) for k in range(len(t0))]
-            some = [predicted(models, sets, film[k], t0[k], states[k], times[k]) for k in rows]
-            return np.concatenate(some)
-        return _as_far_as_it_runs(models, sets, film, t0, states, times)
+        rows = [slice(k, k + 1) for k in range(len(t0))]
+        return np.concatenate([_as_far_as_it_runs(partial(run, k), t0[k], times[k]) for k in rows])
 
 
-def _as_far_as_it_runs(
-    models: Sequence[Model],
-    sets: Sequence[FilmParameters],
-    film: NDArray[np.int64],
-    t0: Array,
-    states: Array,
-    times: Array,
-) -> Array:
-    """Predict one run that does not reach its last time, with bisection for the last time that it reaches."""
-    reached, beyond = 0, times.shape[1]
+def _as_far_as_it_runs(run: Callable[[Array], Array], t0: Array, times: Array) -> Array:
+    """Predict a single run, with bisection for the last time that it reaches; NaN after it."""
+    half, reached, beyond = times.shape[1], 0, times.shape[1] + 1
     # The observation at the start itself takes no run and gives the number of columns.
-    result = np.repeat(_core.predict(models[0], sets, film.tolist(), t0, states, t0[:, None]), beyond, axis=1)
+    result = np.repeat(run(t0[:, None]), half, axis=1)
     while beyond - reached > 1:
-        half = (reached + beyond) // 2
         try:
-            result[:, :half] = _core.predict(models[0], sets, film.tolist(), t0, states, times[:, :half])
+            result[:, :half] = run(times[:, :half])
             reached = half
         except FitError:
             beyond = half
+        half = (reached + beyond) // 2
     result[:, reached:] = np.nan
     return result
 

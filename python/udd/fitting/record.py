@@ -294,32 +294,24 @@ def _akima(at: Array, there: Array, column: Array) -> Array:
 def _noise_of(measurement: Measurement, values: Array) -> Array:
     """Return the assumed noise if a measurement does not state it, of each column or of each frame.
 
-    With a user's own model columns may have gaps, because sensors have different rates.
+    With a user's own model columns may have gaps, because sensors have different rates. Their noise may grow
+    with the reading, unless they come in steps.
     """
+    sensor = profile_of(measurement.kind).sensor
     if profile_of(measurement.kind).written:
         columns = [column[np.isfinite(column)] for column in values.T]
-        typical = np.array([typical_noise(column[:, None])[0] for column in columns])
-        if not any(lattice(column) for column in columns):
-            return _growing(values, typical)
-        steps = np.full(values.shape, np.inf)
-        for step_noise, column in zip(steps.T, values.T, strict=True):
-            step_noise[np.isfinite(column)] = frame_noise(column[np.isfinite(column)])
-        result: Array = np.maximum(typical, steps)
+        is_coarse = any(lattice(column) for column in columns)
+        result = np.full(values.shape, np.inf)
+        for noise, column, present in zip(result.T, columns, np.isfinite(values).T, strict=True):
+            if is_coarse:
+                noise[present] = np.maximum(frame_noise(column), typical_noise(column[:, None]))
+            else:
+                noise[present] = np.maximum(noise_by_size(column), 1e-6 * np.ptp(column) + NO_NOISE)
         return result
-    if profile_of(measurement.kind).sensor.zero is not None and is_encoder(measurement):
+    if sensor.zero is not None and is_encoder(measurement):
         noise = frame_noise(values[:, 0])
         return (noise if noise.all() else few_readings(values[:, 0]))[:, None]
-    return np.array(profile_of(measurement.kind).sensor.sigma)
-
-
-def _growing(values: Array, typical: Array) -> Array:
-    """Return the typical noise of each column, or of each frame if one grows with the reading."""
-    least = 1e-6 * np.array([np.ptp(column[np.isfinite(column)]) for column in values.T])
-    result = np.tile(typical, (len(values), 1))
-    for noise, column, smallest in zip(result.T, values.T, least, strict=True):
-        present = np.isfinite(column)
-        noise[present] = np.maximum(noise_by_size(column[present]), smallest)
-    return result if (np.ptp(result, axis=0) > 0.0).any() else typical
+    return np.array(sensor.sigma)
 
 
 def _joined(records: Sequence[Record]) -> Record:

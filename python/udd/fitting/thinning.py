@@ -32,6 +32,7 @@ _BIAS = 0.3  # share of a mean's noise that the curvature of the motion within a
 # share of a block's frames from which on its mean is corrected; below half of them there is no mean
 _FULL = 0.8
 _NEXT = 1.5  # steps within which a frame follows another
+_ORDER = 5  # of the differences that show a column's noise, in which motion is small
 _PARTS = 4  # parts of a block; their means show the noise
 
 
@@ -94,7 +95,7 @@ def _change(t: Array, values: Array, step: float) -> float:
     Rates are differences over the shortest time in which the motion far exceeds its noise. A motion that
     decays may do so in a part of the record only; one that never does restricts no block.
     """
-    noises = [_noise(x) for x in values.T]
+    noises = noise_by_differences(values, _ORDER).tolist()
 
     def least(rows: slice) -> float:
         columns = zip(values[rows].T, noises, strict=True)
@@ -118,11 +119,6 @@ def _change_of(t: Array, x: Array, step: float, noise: float) -> float:
     return float("inf")
 
 
-def _noise(x: Array) -> float:
-    """Estimate the s.d. of a column's noise from fifth differences, in which motion is small."""
-    return float(noise_by_differences(x, 5))
-
-
 def _averaged(
     measurement: Measurement,
     whole: NDArray[np.bool_],
@@ -135,7 +131,7 @@ def _averaged(
     length = every * step
     part = np.floor((t - t[0]) / length * _PARTS + 1e-9).astype(np.int64)
     block = part // _PARTS
-    good = ~odd_frames(values, np.array([_noise(x) for x in values.T]), np.diff(t) < _NEXT * step)
+    good = ~odd_frames(values, noise_by_differences(values, _ORDER), np.diff(t) < _NEXT * step)
     number = int(block[-1]) + 1
     count = np.bincount(block[good], minlength=number)
     kept, full = count >= every / 2, count >= _FULL * every
@@ -157,10 +153,8 @@ def _averaged(
         # A block mean is off by 1/24 of the second difference, plus a small share of the fourth.
         bends = inside[np.isin(inside - 1, inside) & np.isin(inside + 1, inside)]
         fourth = bend[bends - 1] - 2 * bend[bends] + bend[bends + 1]
-        remainder = (
-            0.0047 * np.sqrt(max(float(np.mean(fourth**2)) - 70 * noise**2, 0.0)) if len(bends) else 0.0
-        )
-        if remainder > _BIAS * noise:
+        excess = float(np.mean(fourth**2)) - 70 * noise**2 if len(bends) else 0.0
+        if 0.0047 * np.sqrt(max(excess, 0.0)) > _BIAS * noise:
             return None
         # A block next to a gap has no second difference, so its mean is not corrected, and it is dropped.
         columns.append(mean - bend / 24)
@@ -169,13 +163,10 @@ def _averaged(
         else:
             stated = means(measurement.sigma[whole, k] ** 2)
             sigmas.append(np.maximum(np.sqrt(stated / least), noise))
-    has_correction = np.zeros(number, dtype=bool)
-    has_correction[inside] = True
-    kept &= has_correction
-    # The model's time counts from the first row, which stays in place, without observations.
-    rest = np.flatnonzero(kept)
+    rest = inside[kept[inside]]
     if not len(rest):
         return None
+    # The model's time counts from the first row, which stays in place, without observations.
     rows = np.concatenate([rest[:1], rest])
     rho = measurement.rho
     if rho is not None:
@@ -189,22 +180,13 @@ def _averaged(
     mean = np.column_stack(columns)[rows]
     mean[0] = np.nan
     # Records of a disk or a pendulum that do not state their noise have a known one.
-    sigma = np.column_stack(sigmas)[rows]
-    return Measurement(
-        times,
-        mean,
-        None if measurement.sigma is None and not profile_of(measurement.kind).written else sigma,
-        rho,
-        None,
-        meta,
-        measurement.names,
-        inputs=measurement.inputs,
-    )
+    is_known = measurement.sigma is None and not profile_of(measurement.kind).written
+    sigma = None if is_known else np.column_stack(sigmas)[rows]
+    return Measurement(times, mean, sigma, rho, None, meta, measurement.names, inputs=measurement.inputs)
 
 
 def _part_noise(part: NDArray[np.int64], x: Array) -> float:
     """Estimate the noise of means over parts of a block, which includes noise slower than frames."""
-    number = int(part[-1]) + 1
-    count = np.bincount(part, minlength=number)
-    mean = np.bincount(part, x, minlength=number)[count > 0] / count[count > 0]
-    return _noise(mean)
+    count = np.bincount(part)
+    mean = np.bincount(part, x)[count > 0] / count[count > 0]
+    return float(noise_by_differences(mean, _ORDER))
