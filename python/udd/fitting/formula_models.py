@@ -71,16 +71,19 @@ def guessed(
     t: Array,
     seen: Mapping[str, Array],
     linked: NDArray[np.bool_],
-    state0: Mapping[str, float] | None = None,
-    noise: Mapping[str, float] | None = None,
+    state0: Mapping[str, float] | None,
+    noise: Mapping[str, float],
 ) -> Array:
     """Guess all states: observed values, else the rate or the integral of an observed state, else zero.
 
     Hidden states with a start value follow their own equations from there, driven by the observed columns.
     Sensor readings are inverted first, each weighed by its `noise`.
     """
+    state0 = state0 or {}
     if model.observe:
-        seen = _behind(model, t, dict(seen), dict(noise or dict.fromkeys(seen, 1.0)), state0 or {})
+        first = np.array([state0.get(name, 0.0) for name in model.state_names])
+        shown = inverted(model, t, dict(seen), dict(noise), first)
+        seen = {name: shown.states[:, k] for k, name in enumerate(model.state_names) if shown.shown[k]}
     rates = {text.strip(): name for name, text in model.equations.items() if name in seen}
     columns = []
     for name in model.state_names:
@@ -89,13 +92,13 @@ def guessed(
         elif name in rates:
             columns.append(slope(t, seen[rates[name]], linked))
         elif (rate := model.equations[name].strip()) in seen:
-            columns.append(_integral(t, seen[rate], (state0 or {}).get(name)))
+            integral = cumulative_trapezoid(seen[rate], t, initial=0.0)
+            columns.append(integral + state0[name] if name in state0 else integral - integral.mean())
         else:
             columns.append(np.zeros(len(t)))
     states = np.column_stack(columns)
-    given = {name: value for name, value in (state0 or {}).items() if name not in seen}
-    if not given:
-        given = _off_the_edge(model, t, states, seen)
+    given = {name: value for name, value in state0.items() if name not in seen}
+    given = given or _off_the_edge(model, t, states, seen)
     return _followed(model, t, states, given) if given else states
 
 
@@ -116,25 +119,6 @@ def _off_the_edge(
         if not np.isfinite(beyond).all() or (beyond == model.rates(t[0], states[0])).all():
             result[model.state_names[k]] = size
     return result
-
-
-def _behind(
-    model: FormulaModel,
-    t: Array,
-    seen: dict[str, Array],
-    noise: dict[str, float],
-    state0: Mapping[str, float],
-) -> dict[str, Array]:
-    """Return the states that sensors show, each frame by itself."""
-    start = np.array([state0.get(name, 0.0) for name in model.state_names])
-    result = inverted(model, t, seen, noise, start)
-    return {name: result.states[:, k] for k, name in enumerate(model.state_names) if result.shown[k]}
-
-
-def _integral(t: Array, rate: Array, start: float | None) -> Array:
-    """Integrate a state of which only the rate is observed, from its start or about zero."""
-    result: Array = cumulative_trapezoid(rate, t, initial=0.0)
-    return result - result.mean() if start is None else result + start
 
 
 def _followed(model: FormulaModel, t: Array, states: Array, start: Mapping[str, float]) -> Array:
