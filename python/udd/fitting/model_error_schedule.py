@@ -239,10 +239,9 @@ def with_noise_correlation(fitted: Fit, enough: float | None = None) -> Fit:
     if fitted.leverage > _LOOSE:
         return fitted
     # Without this k0 and k2 of a record with coloured noise move by three standard errors.
-    memory = noise_autocorrelation(fitted.record, fitted.misfit, fitted.noise_sd, fitted.noise.weight)
+    memory = noise_autocorrelation(fitted)
     if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
         return fitted
-    noise = estimated(fitted.record, fitted.blurring, fitted.misfit, fitted.misfit_variance, fitted.noise)
-    problem = replace(fitted.problem, noise=replace(noise, memory=memory))
+    problem = replace(fitted.problem, noise=replace(estimated(fitted), memory=memory))
     result = minimise(problem, fitted.point, STEPS, enough or _enough(problem))
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted

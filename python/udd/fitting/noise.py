@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from udd._util import chi_squared
 from udd._util.one_line import OneLine
 
 from .record import Record
+
+if TYPE_CHECKING:
+    from .fit_result import Fit
 
 Array = NDArray[np.float64]
 
@@ -87,23 +91,10 @@ def stated(record: Record) -> Noise:
     return Noise(np.ones(channels), np.zeros(channels), weight, np.zeros(channels))
 
 
-def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array, before: Noise) -> Noise:
-    """Estimate the noise from a fit's misfits.
-
-    Parameters
-    ----------
-    record : Record
-    omega : ndarray (n,)
-        Angular velocity, rad/s.
-    misfit : ndarray (n, m)
-        Observations minus fitted values.
-    seen_variance : ndarray (n, m)
-        Variance of the fitted values. The squared misfits are smaller than the noise by it.
-    before : Noise
-        Noise that the fit assumed.
-    """
-    seen = record.observed
-    assumed = before.sd(record, omega)
+def estimated(fit: Fit) -> Noise:
+    """Estimate the noise from a fit's misfits, corrected for the scatter of the fitted values."""
+    record, omega, misfit, before = fit.record, fit.blurring, fit.misfit, fit.noise
+    seen, assumed = record.observed, fit.noise_sd
     distance = _distance(record, misfit, assumed)
     channels = seen.sum(axis=1).clip(1)
     # Outliers are judged by the typical frame, because the stated noise may be wrong.
@@ -121,7 +112,7 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
             continue  # an unobserved state
         # A fit follows its data: each squared misfit is smaller than that of the noise by the fit's leverage.
         variance = assumed[use, m] ** 2
-        leverage = seen_variance[use, m] / variance
+        leverage = fit.misfit_variance[use, m] / variance
         power = misfit[use, m] ** 2 / shown[use] / np.maximum(1.0 - leverage, 0.05)
         least = _EXACT * np.abs(record.seen[use, m]).max()
         terms = np.column_stack([record.sigma[use, m] ** 2, omega[use] ** 2])
@@ -135,20 +126,13 @@ def estimated(record: Record, omega: Array, misfit: Array, seen_variance: Array,
     return Noise(factor, blur, weight, before.memory)
 
 
-def noise_autocorrelation(record: Record, misfit: Array, sd: Array, weight: Array) -> Array:
-    """Estimate the lag-1 autocorrelation of the noise, per channel.
+def noise_autocorrelation(fit: Fit) -> Array:
+    """Estimate the lag-1 autocorrelation of the noise, per channel, from a fit with a small model error.
 
     It is 0 if it is not significant, and 0 if it would last for many frames: that is motion that the model
-    lacks.
-
-    Parameters
-    ----------
-    record : Record
-    misfit, sd : ndarray (n, m)
-        Misfits of a model with a small model error, and the standard deviation of the noise.
-    weight : ndarray (n,)
-        Weights of the frames. Outliers (below 1) are left out.
+    lacks. Outliers are left out.
     """
+    record, misfit, sd, weight = fit.record, fit.misfit, fit.noise_sd, fit.noise.weight
     there = record.observed & (weight == 1.0)[:, None]
     scaled = np.divide(misfit, sd, out=np.zeros(misfit.shape), where=there)
     pairs = there[1:] & there[:-1] & record.linked[:, None]

@@ -137,7 +137,7 @@ def _estimate_noise(problem: Problem, point: Point, steps: int = MOST) -> tuple[
             return "faults", problem, point
         if result.leverage > FOLLOWS:
             return "little", problem, point
-        noise = estimated(problem.record, result.blurring, result.misfit, result.misfit_variance, before)
+        noise = estimated(result)
         if is_known and noise.beyond(problem.record, result.blurring, _BELIEVED):
             return "faults", problem, point
         noise = replace(noise, factor=np.maximum(noise.factor, least))
