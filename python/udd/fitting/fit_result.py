@@ -363,7 +363,8 @@ def minimise(problem: Problem, point: Point, iterations: int = MOST, decrease: f
     # Every state except a run's first is tied to the one before: the frames' misfits remain.
     runs = 1 + int((~record.linked).sum())
     proper = sum(np.isfinite(f.sd) for f in problem.free)
-    dof = float(seen.sum()) + proper - len(problem.free) - runs * end.states.shape[1]
+    counted = float(seen[problem.noise.weight > 0.0].sum())
+    dof = counted + proper - len(problem.free) - runs * end.states.shape[1]
     linked = record.linked[:, None]
     dt = np.where(linked, np.diff(record.t)[:, None], 1.0)
     errors = np.sqrt(np.diag(result["covariance"])).tolist()

@@ -294,7 +294,8 @@ def forecast(
     runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, random)
     shown = [fitted.channels.index(name) for name in measurement.names]
     seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
-    spread = np.nanstd(past.values, axis=0)
+    is_regular = ~np.isin(np.arange(len(past)), record.row[record.odd])
+    spread = np.nanstd(past.values[is_regular], axis=0)
 
     shares = [tail, 0.5, 1.0 - tail]
     low, median, high = _quantiles(seen, shares)
@@ -383,7 +384,7 @@ def _starts(
     rng: np.random.Generator,
 ) -> tuple[list[Model], list[list[float]], Array]:
     """Draw every member's model, camera and state at the window's end."""
-    seen = Observations.of(part, fitted.noise.everywhere(len(part.t)), part.states[:, 0])
+    seen = Observations.of(part, fitted.noise.of(part), part.states[:, 0])
     (_values, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
     models, cameras, states = [], [], []
     free = [f for f in fitted.problem.free if f.film in (None, film)]

@@ -54,9 +54,9 @@ class Noise(OneLine):
     weight: Array
     memory: Array
 
-    def everywhere(self, frames: int) -> Noise:
-        """Return the same noise for another record, without outliers."""
-        return replace(self, weight=np.ones(frames))
+    def of(self, record: Record) -> Noise:
+        """Return the same noise for another record, the outliers of which get weight 0."""
+        return replace(self, weight=np.where(record.odd, 0.0, 1.0))
 
     def sd(self, record: Record, omega: Array) -> Array:
         """Return the standard deviation of every frame and channel, (n, m)."""
@@ -87,8 +87,7 @@ class Noise(OneLine):
 def stated(record: Record) -> Noise:
     """Return the noise that the measurement states; outliers get weight 0."""
     channels = record.seen.shape[1]
-    weight = np.where(record.odd, 0.0, 1.0)
-    return Noise(np.ones(channels), np.zeros(channels), weight, np.zeros(channels))
+    return Noise(np.ones(channels), np.zeros(channels), np.ones(0), np.zeros(channels)).of(record)
 
 
 def estimated(fit: Fit) -> Noise:
@@ -101,7 +100,9 @@ def estimated(fit: Fit) -> Noise:
     numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
     typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi_squared.ppf(0.5, numbers))
     limit = (np.sqrt(chi_squared.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
-    weight = np.where(distance > limit, limit / np.maximum(distance, limit), 1.0)
+    # An outlier that the fit confirms stays without weight: its chi2 would hide that of all other frames.
+    less = np.where(record.odd, 0.0, limit / np.maximum(distance, limit))
+    weight = np.where(distance > limit, less, 1.0)
     # The variance comes from the frames within the limit, in which normal noise has this share of its
     # variance.
     shown = (chi_squared.cdf(chi_squared.ppf(_HONEST, numbers), numbers + 2) / _HONEST)[channels - 1]

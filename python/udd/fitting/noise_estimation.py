@@ -56,8 +56,7 @@ def solve_with_noise(problem: Problem, point: Point) -> Fit:
             return solve(loose.problem, tighter, _afresh(loose), best=loose)
     # If the noise never shows, or is below the model's faults, the film is very precise: use its stated
     # noise.
-    believed = as_stated.everywhere(len(problem.record.t))
-    return solve(replace(problem, noise=believed), problem.schedule, first)
+    return solve(replace(problem, noise=as_stated), problem.schedule, first)
 
 
 def _likeliest_noise(fitted: Fit, tighter: Sequence[tuple[float, ...]]) -> Fit:

@@ -82,6 +82,6 @@ def filtered(
 
     All parameters are those of a fit.
     """
-    seen = Observations.of(record, fitted.noise.everywhere(len(record.t)), record.states[:, 0])
+    seen = Observations.of(record, fitted.noise.of(record), record.states[:, 0])
     fixed = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
     return _core.filter(fixed, [(int(a), int(b)) for a, b in windows])

@@ -266,6 +266,9 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
     odd = odd_frames(guess, typical, linked)
     for channel in guess.T:
         channel[odd] = _between(odd, channel)
+    if odd[there].any() and stated is None:  # outliers do not show the noise, nor the range, of a column
+        clean = np.where(present & odd[there, None], guess[there], read)
+        sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, clean), np.inf)
     film = np.zeros(len(t), dtype=np.int64)
     if formula_model:
         typical_noises = dict(zip(columns, typical.tolist(), strict=True))

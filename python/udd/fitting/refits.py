@@ -221,8 +221,8 @@ def smoothed_states(fitted: Fit, record: Record, level: int) -> Fit:
 
     A wrong model may not reach that level; the result's level says how far it came.
     """
-    problem = replace(fitted.problem, record=record, free=(), models=fitted.models)
-    problem = replace(problem, noise=fitted.noise.everywhere(len(record.t)))
+    noise = fitted.noise.of(record)
+    problem = replace(fitted.problem, record=record, free=(), models=fitted.models, noise=noise)
     start = Point(record.states, fitted.point.sets)
     return solve(problem, problem.schedule[: level + 1], start)
 
