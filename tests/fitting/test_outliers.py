@@ -12,9 +12,9 @@ SPRING = udd.Model(["x", "v"], ["v", "-k*x - c*v"], {"k": 4.0, "c": 0.1})
 FRAMES = [50, 180, 300, 396]
 
 
-def spring(size: float) -> udd.Measurement:
+def spring(size: float, frames: list[int] = FRAMES) -> udd.Measurement:
     x = np.array(udd.simulate(SPRING, T, [1.0, 0.0]).x) + 0.01 * np.random.default_rng(1).normal(size=len(T))
-    x[FRAMES] += size
+    x[frames] += size
     return udd.Measurement(T, {"x": x})
 
 
@@ -54,3 +54,14 @@ def test_a_forecast_ignores_an_outlier_in_its_window(size: float) -> None:
     assert abs(median - clean.median[-1, 0]) < 0.02
     # The unit of the error is the spread of the motion.
     assert result.valid_time == clean.valid_time
+
+
+@pytest.mark.parametrize("frames", [[0], [1], [0, 1], [-2], [-1], [0, -1]])
+def test_outliers_at_an_end_do_not_hurt(frames: list[int]) -> None:
+    clean, result = (udd.forecast(spring(size, frames), SPRING, 2.0, members=60) for size in (0.0, 30.0))
+    assert not result.fit.doubts.missing
+    assert 0.8 < result.fit.scatter < 1.3
+    for name, error in clean.fit.errors.items():
+        assert abs(result.fit.parameters[name] - clean.fit.parameters[name]) < 0.5 * error
+    assert np.abs(result.median - clean.median).max() < 0.02
+    assert np.flatnonzero(result.fit.record.odd).tolist() == sorted(k % len(T) for k in frames)

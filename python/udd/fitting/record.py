@@ -39,6 +39,7 @@ _ODD = 9.0
 _FEWEST = 10  # Frames of a fit.
 _FEWEST_OF_SEVERAL = 4  # The same of each of several records. Start states use up fewer.
 _SHORT = 30  # A record with fewer frames hardly shows its noise.
+_END, _JUMP = 8, 20.0  # Frames at an end of a run, and the steps between them that no motion jumps there.
 _LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
 _OF_FRAMES = ("t", "seen", "sigma", "rho", "states", "odd", "row", "film")  # arrays with a row for each frame
 _CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
@@ -346,12 +347,14 @@ def _fill(
 def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Detect frames far from the cubic through the two before and after, in any channel (noise `sigma`)."""
     n = len(guess)
-    odd = np.zeros(n, dtype=bool)
+    odd = _odd_ends(guess, sigma, linked)
     inside = np.zeros(n, dtype=bool)
     inside[2:-2] = linked[:-3] & linked[1:-2] & linked[2:-1] & linked[3:]
     if not inside.any():
         return odd
     filled = guess.copy()
+    for channel in filled.T:
+        channel[odd] = _between(odd, channel)
     for _ in range(_CLEANED):
         off = np.zeros_like(guess)
         cubic = (4 * (filled[1:-3] + filled[3:-1]) - filled[:-4] - filled[4:]) / 6
@@ -370,6 +373,17 @@ def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray
         odd |= is_odd
         for channel in filled.T:
             channel[odd] = _between(odd, channel)
+    return odd
+
+
+def _odd_ends(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Detect the first and the last two frames of a run that lie far beyond the steps of the next frames."""
+    odd = np.zeros(len(guess), dtype=bool)
+    for run in np.split(np.arange(len(guess)), np.flatnonzero(~linked) + 1):
+        for frames in (run, run[::-1]) if len(run) >= 2 * _END else ():
+            near = guess[frames[2:_END]]
+            limit = _JUMP * np.maximum(np.abs(np.diff(near, axis=0)).max(axis=0), sigma)
+            odd[frames[:2]] |= (np.abs(guess[frames[:2]] - near[0]) > limit).any(axis=1)
     return odd
 
 
