@@ -92,6 +92,8 @@ def test_a_part_of_a_picture_is_corrected_as_the_whole() -> None:
         box = slice(20 // step, 80 // step), slice(40 // step, 100 // step)
         a, b = getattr(whole, name).astype(int), getattr(part, name).astype(int)
         assert np.abs(a[box] - b[box]).max() <= 3 and np.abs(a - b).max() > 30
+    outside = moved(raw, (0, 120, 160, 160))  # the disk has left the picture
+    assert (outside.u == moved(raw, (0, 0, 0, 0)).u).all()
     turned = replace(moved, turns=1)
     assert (turned(raw, (20, 80, 40, 100)).y == turned(raw).y).all()
 

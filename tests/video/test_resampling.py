@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 
 from udd.tracking.correction import Correction
+from udd.video import resampling
 from udd.video.reader import Picture
 from udd.video.resampling import resampled
 
@@ -44,3 +45,14 @@ def test_whole_pixels_change_nothing_else() -> None:
     moved = resampled(picture, np.array([[1.0, 0.0, 3.0], [0.0, 1.0, -2.0]]))
     assert np.array_equal(moved[2:, :-3], picture[:-2, 3:])
     assert np.array_equal(moved[0], moved[1])  # beyond the edge its value
+
+
+def test_a_large_picture_is_resampled_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.random.default_rng(1).integers(0, 256, (90, 130, 3)).astype(np.uint8)
+    view = np.array([[1.01, -0.03, 4.3], [0.03, 1.01, -2.7]])
+    whole = resampled(picture, view)
+    monkeypatch.setattr(resampling, "PART", 130 * 11)
+    assert np.abs(resampled(picture, view) - whole).max() < 0.05  # of codes that jump by 255
+    part = resampled(picture, view + np.column_stack([np.zeros((2, 2)), view[:, :2] @ [40, 20]]), (30, 25))
+    assert np.abs(part - whole[20:45, 40:70]).max() < 0.05
+    assert resampled(picture, view, (0, 5)).shape == (5, 0, 3)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MIDWAY = (3 / 256, -25 / 256, 150 / 256, 150 / 256, -25 / 256, 3 / 256)  # value between two pixels
+PART = 1 << 17  # pixels that are resampled at once: the processor's cache holds them
 
 
 def resampled(
@@ -33,10 +34,22 @@ def resampled(
     ndarray of float32
         Outside the picture the value of the nearest edge.
     """
+    width, height = picture.shape[1::-1] if size is None else size
+    out = np.empty((height, width, *picture.shape[2:]), np.float32)
+    if not out.size:
+        return out
+    rows = max(1, PART // width)
+    for row in range(0, height, rows):
+        here = view + np.column_stack([np.zeros((2, 2)), row * view[:, 1]])
+        part = out[row : row + rows]
+        part[:] = _part(*_needed(picture, here, part.shape[1::-1]), part.shape[1::-1])
+    return out
+
+
+def _part(picture: NDArray[Any], view: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float32]:
+    """Resample a picture that is small enough for the processor's cache."""
     import cv2
 
-    size = picture.shape[1::-1] if size is None else size
-    picture, view = _needed(picture, view, size)
     source = np.asarray(picture, np.float32)
     moves = view - np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     if not moves[:, :2].any() and not (moves[:, 2] % 1).any():  # whole pixels need no filter
@@ -58,7 +71,7 @@ def resampled(
 
 
 def _needed(
-    picture: NDArray[Any], view: NDArray[np.float64], size: tuple[int, int]
+    picture: NDArray[Any], view: NDArray[np.float64], size: tuple[int, ...]
 ) -> tuple[NDArray[Any], NDArray[np.float64]]:
     """Return the part of a picture that shows in the result, with the map to it."""
     corners = np.array([[0, 0, 1], [size[0], 0, 1], [0, size[1], 1], [size[0], size[1], 1]]) @ view.T
@@ -69,7 +82,7 @@ def _needed(
 
 
 def _warped(
-    source: NDArray[np.float32], view: NDArray[np.float64], size: tuple[int, int]
+    source: NDArray[np.float32], view: NDArray[np.float64], size: tuple[int, ...]
 ) -> NDArray[np.float32]:
     import cv2
 
