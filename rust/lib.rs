@@ -1,8 +1,8 @@
 //! The core of `udd`, the laboratory of the upward-driven disk.
 //!
 //! Data flows one way; nothing below knows what stands above it:
-//! [`scalar`] (what a number is) → [`formula`] (what a user writes) → [`model`] (what is integrated) → [`tape`] (its power
-//! series) → [`integrate`] (how a step is taken) → [`observe`] (what is seen on the way) → [`analysis`] (runs, sections,
+//! [`scalar`] (what a number is) → [`machine`] (code made at run time) → [`formula`] (what a user writes) → [`model`] (what is
+//! integrated) → [`tape`] (its power series) → [`integrate`] (how a step is taken) → [`observe`] (what is seen on the way) → [`analysis`] (runs, sections,
 //! exponents) → [`estimate`] (what measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
 //! [`image`], the inner loop of the tracker, and [`memory`] use none of these. The files
 //! `sides`, `tolerance` and `failure` are below all layers.
@@ -17,6 +17,7 @@ pub mod formula;
 pub mod image;
 pub mod integrate;
 mod inverse;
+pub mod machine;
 pub mod memory;
 pub mod model;
 pub mod observe;

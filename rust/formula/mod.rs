@@ -3,6 +3,7 @@
 //! It is parsed by a whitelist of names, operators and functions to a list of operations, nothing else in the text means
 //! anything. A [`Program`] made of it can be evaluated over any [`Scalar`].
 
+mod compile;
 mod kinks;
 mod parse;
 mod program;

@@ -4,8 +4,10 @@
 
 use std::collections::HashMap;
 
+use super::compile::{self, Compiled};
 use super::{Binary, Expression, Kink, Leaf, Op, Spline, Unary};
-use crate::scalar::Scalar;
+use crate::machine::Codes;
+use crate::scalar::{Isa, Scalar};
 use crate::sides::{MAX_SURFACES, Sides};
 
 /// Where formulas are evaluated.
@@ -20,7 +22,7 @@ pub struct Place<'a, S> {
 
 /// The effect of an operation on its registers `a`, `b`, `c` and `d`. Each operation of the text is rounded by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Action {
+pub(super) enum Action {
     Add,
     Sub,
     Mul,
@@ -62,10 +64,10 @@ enum Action {
 
 /// An operation and the register of its result.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Step {
-    action: Action,
-    of: [u16; 4],
-    to: u16,
+pub(super) struct Step {
+    pub(super) action: Action,
+    pub(super) of: [u16; 4],
+    pub(super) to: u16,
 }
 
 /// Formulas, ready to be evaluated.
@@ -82,7 +84,7 @@ struct Step {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Program {
     /// The first registers hold so many components of the state.
-    states: usize,
+    pub(super) states: usize,
     /// The next ones hold these.
     leaves: Vec<Leaf>,
     /// How many of them the parameters determine: they are the last ones.
@@ -90,18 +92,21 @@ pub struct Program {
     splines: Vec<Spline>,
     /// Operations on parameters and numbers alone. Their registers hold nothing else.
     first: Vec<Step>,
-    steps: Vec<Step>,
+    pub(super) steps: Vec<Step>,
     results: Vec<u16>,
     registers: usize,
+    pub(super) codes: Codes<Compiled>,
 }
 
 /// The numbers of registers that programs have room for without an allocation: powers of two.
 const ROOMS: [usize; 4] = [8, 16, 32, 64];
 
 /// The registers of a program.
-trait Room<S> {
+pub(super) trait Room<S> {
     fn at(&self, register: u16) -> S;
     fn put(&mut self, register: u16, value: S);
+    /// All of them.
+    fn all(&mut self) -> &mut [S];
 }
 
 /// A program has as many registers, or fewer: the remainder is the number itself, and the compiler need not check it.
@@ -115,6 +120,11 @@ impl<S: Scalar, const R: usize> Room<S> for [S; R] {
     fn put(&mut self, register: u16, value: S) {
         self[usize::from(register) % R] = value;
     }
+
+    #[inline(always)]
+    fn all(&mut self) -> &mut [S] {
+        self
+    }
 }
 
 impl<S: Scalar> Room<S> for [S] {
@@ -126,6 +136,11 @@ impl<S: Scalar> Room<S> for [S] {
     #[inline(always)]
     fn put(&mut self, register: u16, value: S) {
         self[usize::from(register)] = value;
+    }
+
+    #[inline(always)]
+    fn all(&mut self) -> &mut [S] {
+        self
     }
 }
 
@@ -263,19 +278,25 @@ impl Program {
         work: &mut W,
         results: &mut [S],
     ) {
-        let mut next = 0;
-        for &component in &place.x[..self.states] {
-            work.put(next, component);
-            next += 1;
-        }
-        for leaf in &self.leaves[..self.leaves.len() - self.constants] {
+        let varying = &self.leaves[..self.leaves.len() - self.constants];
+        for (at, leaf) in (register(self.states)..).zip(varying) {
             match *leaf {
-                Leaf::Time => work.put(next, place.t),
-                Leaf::Rate(n) => work.put(next, place.rates[n]),
-                Leaf::Input(k) => work.put(next, place.inputs[k]),
+                Leaf::Time => work.put(at, place.t),
+                Leaf::Rate(n) => work.put(at, place.rates[n]),
+                Leaf::Input(k) => work.put(at, place.inputs[k]),
                 Leaf::State(_) | Leaf::Number(_) | Leaf::Parameter(_) => {}
             }
-            next += 1;
+        }
+        let code = |lanes| compile::compile(self, Isa::best(), lanes);
+        if let Some(compiled) = self.codes.get::<S>(0, compile::INTERPRETED, code) {
+            compiled.run(self, place.x, sides, work.all());
+            for (result, &at) in results.iter_mut().zip(&self.results) {
+                *result = if usize::from(at) < self.states { place.x[usize::from(at)] } else { work.at(at) };
+            }
+            return;
+        }
+        for (at, &component) in (0..).zip(&place.x[..self.states]) {
+            work.put(at, component);
         }
         self.perform(&self.steps, sides, work);
         for (result, &at) in results.iter_mut().zip(&self.results) {
@@ -285,7 +306,12 @@ impl Program {
 
     /// Does the steps one after the other.
     #[inline(always)]
-    fn perform<S: Scalar, W: Room<S> + ?Sized>(&self, steps: &[Step], sides: &Sides<S>, work: &mut W) {
+    pub(super) fn perform<S: Scalar, W: Room<S> + ?Sized>(
+        &self,
+        steps: &[Step],
+        sides: &Sides<S>,
+        work: &mut W,
+    ) {
         for step in steps {
             let [a, b, c, d] = step.of;
             macro_rules! of {
@@ -659,6 +685,7 @@ impl<'a> Registers<'a> {
             first,
             steps,
             registers: self.count,
+            codes: Codes::default(),
         }
     }
 

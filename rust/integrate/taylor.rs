@@ -58,19 +58,14 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         let mut bad = S::mask(false);
         for halvings in 0..=MOST_HALVINGS {
             let Trial { size, error, .. } = *trial;
-            let (isa, known) = (self.jets.isa(), error.finite());
+            let isa = self.jets.isa();
             let end = vector!(S::Real, D; n => trial.x[n].real());
             let mut strays = |part: f64| {
                 let dt = size.scale(part);
                 let x = if part == 1.0 { end } else { self.real_at(dt, &[true; D]) };
-                let defect = Defect { method: &mut *self, at, from: &from, x: &x, size, dt, norm };
+                let strays = Strays { method: &mut *self, at, from: &from, x: &x, size, error, dt, norm };
                 // Packets are only fast with their own instructions.
-                let defect = if const { S::Real::LANES > 1 } {
-                    S::Real::work(isa, defect)
-                } else {
-                    defect.run::<Plain>()
-                };
-                known.and(defect.less(S::Real::constant(MOST_DEFECT)).not())
+                if const { S::Real::LANES > 1 } { S::Real::work(isa, strays) } else { strays.run::<Plain>() }
             };
             bad = strays(1.0);
             // A coordinate may leave a spline's cell and return to it.
@@ -95,29 +90,30 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     }
 }
 
-/// The difference between the polynomial's rates at a distance `dt` and those of the law, over a step of this `size`,
-/// in
-/// units of what its error may be; `x` is the state there.
-struct Defect<'a, 'b, S: Scalar, const D: usize, E> {
+/// The comparison of the polynomial's rates with those of the law, at a distance `dt` in a step of this `size`. It is true if
+/// they differ by too much, and the step's `error` is a number; `x` is the state there.
+struct Strays<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
     at: &'a StepStart<S, D>,
     from: &'a [S::Real; D],
     x: &'a [S::Real; D],
     size: S::Real,
+    error: S::Real,
     dt: S::Real,
     norm: &'a E,
 }
 
-impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Defect<'_, '_, S, D, E> {
-    type Output = S::Real;
+impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Strays<'_, '_, S, D, E> {
+    type Output = S::Mask;
 
     #[inline(always)]
-    fn run<V: InstructionSet>(self) -> S::Real {
-        let Self { method, at, from, x, size, dt, norm } = self;
+    fn run<V: InstructionSet>(self) -> S::Mask {
+        let Self { method, at, from, x, size, error, dt, norm } = self;
         let rates = method.jets.rates(method.tape, at.t + dt, x, &at.sides);
         let slope = method.jets.slope_here(dt);
         let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
-        norm.state().norm(defect, *from, *x)
+        let defect = norm.state().norm(defect, *from, *x);
+        error.finite().and(defect.less(S::Real::constant(MOST_DEFECT)).not())
     }
 }
 

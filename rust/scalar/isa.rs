@@ -1,4 +1,5 @@
-//! The instruction set, chosen when the program runs. The crate's `unsafe` is here and in `lanes.rs`.
+//! The instruction set, chosen when the program runs. The crate's `unsafe` is here, in `lanes.rs` and
+//! in `machine/memory.rs`.
 
 use std::fmt::Debug;
 use std::sync::OnceLock;

@@ -75,6 +75,8 @@ pub trait Scalar:
     /// The same for a factor without derivatives.
     fn fused_times(self, a: Self, b: Self::Real) -> Self;
 
+    /// True for a number that is its lanes side by side in memory, and nothing else.
+    const IS_PLAIN: bool = false;
     /// Whether it records what is done with it: then all branches are taken, and none is known.
     const SYMBOLIC: bool = false;
     /// The order of its derivatives: 0 for a number without.

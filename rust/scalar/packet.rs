@@ -173,6 +173,8 @@ impl<const L: usize, V: InstructionSet> Scalar for Packet<L, V> {
     type Real = Self;
     type Mask = LaneMask<L, V>;
     type Register = Packet<LANES, V>;
+    // Few lanes may be aligned with gaps.
+    const IS_PLAIN: bool = size_of::<Self>() == size_of::<[f64; L]>();
 
     #[inline(always)]
     fn register(self, i: usize) -> Packet<LANES, V> {

@@ -6,6 +6,7 @@ impl Scalar for f64 {
     type Real = f64;
     type Mask = bool;
     type Register = f64;
+    const IS_PLAIN: bool = true;
 
     #[inline(always)]
     fn register(self, _i: usize) -> f64 {

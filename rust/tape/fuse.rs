@@ -4,14 +4,17 @@
 //! that only one linear step uses is passed on in a register: `x y - b z` is one operation instead of three. Nothing is
 //! reordered or rounded otherwise, so no bit changes.
 
+use super::compile::{self, Start};
+use super::group::Plan;
 use super::node::{INVERSE, Node, Step};
 use super::series::{inner_at, inner_square_at};
+use crate::machine::{Code, Codes};
 use crate::model::Sides;
-use crate::scalar::{InstructionSet, Scalar};
+use crate::scalar::{InstructionSet, Isa, Scalar};
 
 /// A linear operation on the coefficient `c` just found; `a` is a series, `h` a held value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Then {
+pub(super) enum Then {
     /// `-c`
     Neg,
     /// `c + a`
@@ -41,7 +44,7 @@ const MOST: usize = 3;
 
 /// The first value of a chain of linear operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum First {
+pub(super) enum First {
     /// `a`
     Series,
     /// `a b`
@@ -52,33 +55,103 @@ enum First {
 
 /// A product or a series and the linear operations that follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Chain {
-    first: First,
-    count: u8,
-    a: u16,
-    b: u16,
-    then: [Then; MOST],
+pub(super) struct Chain {
+    pub(super) first: First,
+    pub(super) count: u8,
+    pub(super) a: u16,
+    pub(super) b: u16,
+    pub(super) then: [Then; MOST],
     /// The slot of the result, or the component of the state whose rate it is.
-    to: u16,
-    is_rate: bool,
+    pub(super) to: u16,
+    pub(super) is_rate: bool,
 }
 
 /// Chains, then a step that is none.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Stretch {
-    chains: Vec<Chain>,
-    last: Option<Step>,
+pub(super) struct Stretch {
+    pub(super) chains: Vec<Chain>,
+    pub(super) last: Option<Step>,
 }
 
 /// The operations of a tape for each order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Program {
-    stretches: Vec<Stretch>,
+    pub(super) stretches: Vec<Stretch>,
     /// Slots of rates that are needed elsewhere, too, and the components they belong to.
-    copied: Vec<(u16, u16)>,
+    pub(super) copied: Vec<(u16, u16)>,
+    pub(super) slots: usize,
+    pub(super) plan: Plan,
+    pub(super) codes: Codes<Code>,
+    starts: Codes<Start>,
+}
+
+impl Then {
+    /// The same with other series and held values.
+    fn map(self, slot: &mut dyn FnMut(u16) -> u16, held: &mut dyn FnMut(u16) -> u16) -> Self {
+        match self {
+            Then::Neg => Then::Neg,
+            Then::Add(a) => Then::Add(slot(a)),
+            Then::Sub(a) => Then::Sub(slot(a)),
+            Then::From(a) => Then::From(slot(a)),
+            Then::Plus(h) => Then::Plus(held(h)),
+            Then::Minus(h) => Then::Minus(held(h)),
+            Then::FromHeld(h) => Then::FromHeld(held(h)),
+            Then::Scale(h) => Then::Scale(held(h)),
+            Then::AddScaled(a, h) => Then::AddScaled(slot(a), held(h)),
+            Then::SubScaled(a, h) => Then::SubScaled(slot(a), held(h)),
+            Then::FromScaled(a, h) => Then::FromScaled(slot(a), held(h)),
+        }
+    }
+}
+
+impl Chain {
+    /// The rate of a component that is a series.
+    pub(super) fn copy(a: u16, n: u16) -> Self {
+        Self { first: First::Series, count: 0, a, b: a, then: [Then::Neg; MOST], to: n, is_rate: true }
+    }
+
+    /// The same with other series and held values; its result stays.
+    pub(super) fn map(mut self, slot: &mut dyn FnMut(u16) -> u16, held: &mut dyn FnMut(u16) -> u16) -> Self {
+        let a = self.a;
+        self.a = slot(a);
+        self.b = if self.first == First::Product { slot(self.b) } else { self.a };
+        for then in &mut self.then[..usize::from(self.count)] {
+            *then = then.map(slot, held);
+        }
+        self
+    }
 }
 
 impl Node {
+    /// The same with other series and held values.
+    pub(super) fn map(self, slot: &mut dyn FnMut(u16) -> u16, held: &mut dyn FnMut(u16) -> u16) -> Self {
+        match self {
+            Node::Time => Node::Time,
+            Node::Hold(h) => Node::Hold(held(h)),
+            Node::Input(h) => Node::Input(held(h)),
+            Node::Neg(a) => Node::Neg(slot(a)),
+            Node::Add(a, b) => Node::Add(slot(a), slot(b)),
+            Node::Sub(a, b) => Node::Sub(slot(a), slot(b)),
+            Node::Plus(a, h) => Node::Plus(slot(a), held(h)),
+            Node::Minus(a, h) => Node::Minus(slot(a), held(h)),
+            Node::From(h, a) => Node::From(held(h), slot(a)),
+            Node::Scale(a, h) => Node::Scale(slot(a), held(h)),
+            Node::Mul(a, b) => Node::Mul(slot(a), slot(b)),
+            Node::Square(a) => Node::Square(slot(a)),
+            Node::Div(a, b) => Node::Div(slot(a), slot(b)),
+            Node::Over(h, a) => Node::Over(held(h), slot(a)),
+            Node::Sqrt(a) => Node::Sqrt(slot(a)),
+            Node::Exp(a) => Node::Exp(slot(a)),
+            Node::Ln(a) => Node::Ln(slot(a)),
+            Node::Sin(a) => Node::Sin(slot(a)),
+            Node::Cos(a) => Node::Cos(slot(a)),
+            Node::Tanh(a) => Node::Tanh(slot(a)),
+            Node::Slope(a) => Node::Slope(slot(a)),
+            Node::Select(side, a, b) => Node::Select(side, slot(a), slot(b)),
+            Node::Piece(place, at, cells) => Node::Piece(slot(place), at, cells),
+        }
+    }
+
     /// The series that it needs.
     fn operands(self) -> impl Iterator<Item = u16> {
         let (a, b) = match self {
@@ -143,7 +216,8 @@ impl Program {
         stretches.push(fusing.stretch);
         let copied = (0..).zip(rates).filter(|&(n, _)| !delivered[usize::from(n)]);
         let copied = copied.map(|(n, &slot)| (slot, n)).collect();
-        Self { stretches, copied }
+        let program = Self { stretches, copied, slots, ..Self::default() };
+        Self { plan: Plan::of(&program), ..program }
     }
 }
 
@@ -230,6 +304,21 @@ impl Program {
     /// The coefficients of order 0, and those of the components of order 1.
     #[inline(always)]
     pub(super) fn start<S: Scalar, const N: usize>(
+        &self,
+        work: &mut [[S; N]],
+        held: &[S],
+        t: S,
+        sides: &Sides<S>,
+    ) {
+        let make = |lanes| compile::start(self, Isa::best(), lanes, N);
+        match self.starts.get::<S>(usize::from(N == 2), compile::INTERPRETED, make) {
+            Some(start) => start.run(work, held, t, sides),
+            None => self.interpret_start(work, held, t, sides),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn interpret_start<S: Scalar, const N: usize>(
         &self,
         work: &mut [[S; N]],
         held: &[S],

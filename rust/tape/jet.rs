@@ -1,5 +1,6 @@
 //! The Taylor coefficients of a solution.
 
+use super::compile;
 use super::fuse::Program;
 use super::node::{INVERSE, hold};
 use super::specialised::Specialised;
@@ -30,10 +31,13 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
         const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
         let zero = S::Real::zero();
+        // Single trajectories have the rows of machine code behind the slots.
+        let is_single = S::IS_PLAIN && S::Real::LANES == 1;
+        let rows = if is_single { tape.program.plan.numbers(N).div_ceil(N) } else { 0 };
         Self {
             isa,
             order: N - 1,
-            work: vec![[S::zero(); N]; tape.slots],
+            work: vec![[S::zero(); N]; tape.slots + rows],
             held: vec![S::zero(); tape.held.len()],
             values: vec![[zero; 2]; tape.slots],
             held_values: vec![zero; tape.held.len()],
@@ -125,7 +129,6 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             return disk_series::expand::<V, S, D, N>(work, order, (held, at), x, sides);
         }
         unroll!(n in 0..D => { work[n][0] = x[n]; });
-        let work = &mut work[..tape.slots];
         let program = &tape.program;
         S::Real::work(*isa, Interpretation { program, work, order, held, t, sides });
     }
@@ -224,6 +227,15 @@ impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
             program.start(work, held, t, sides);
         } else {
             begin(program, work, held, t, sides);
+        }
+        // Machine code is made for the orders that are used, with the best instructions.
+        let is_best = S::Real::LANES == 1 || V::ISA == Isa::best();
+        if is_best && (order == LOW || order == HIGH) {
+            let make = |lanes| compile::series(program, Isa::best(), lanes, N, order);
+            let variant = usize::from(order == HIGH);
+            if let Some(code) = program.codes.get::<S>(variant, compile::INTERPRETED, make) {
+                return code.run(0, work.as_flattened_mut(), held, sides);
+            }
         }
         for k in 1..order.min(N - 1) {
             program.next::<V, S, N>(work, held, sides, k);

@@ -4,9 +4,11 @@
 //! what repeated evaluation of the rates cannot: the Taylor coefficients of the solution, order by
 //! order ([`Jets`]), over any [`Scalar`]: one trajectory, a packet, tangents, packets of tangents.
 
+mod compile;
 mod disk_series;
 mod dle_series;
 mod fuse;
+mod group;
 mod jet;
 mod node;
 mod record;

@@ -231,7 +231,7 @@ impl Step {
 
     /// The series whose product enters coefficient `k`; a square where they are the same.
     #[inline(always)]
-    fn factors(self) -> Option<(u16, u16)> {
+    pub(super) fn factors(self) -> Option<(u16, u16)> {
         let to = self.to;
         match self.node {
             Node::Div(_, b) | Node::Over(_, b) => Some((to, b)),

@@ -10,7 +10,18 @@ import pytest
 
 RUST = Path(__file__).parents[2] / "rust"
 # From the lowest layer up, as CONTRIBUTING.md and rust/lib.rs have them.
-LAYERS = ["scalar", "formula", "model", "tape", "integrate", "observe", "analysis", "estimate", "python"]
+LAYERS = [
+    "scalar",
+    "machine",
+    "formula",
+    "model",
+    "tape",
+    "integrate",
+    "observe",
+    "analysis",
+    "estimate",
+    "python",
+]
 
 
 def used_by(text: str) -> set[str]:

@@ -1,0 +1,202 @@
+//! Operations on registers, to be encoded.
+
+use std::collections::HashMap;
+
+use crate::scalar::Isa;
+
+/// A register, by its number below 16.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register(pub u8);
+
+/// An array that code reads, or writes if it is `Work`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Array {
+    Work,
+    Held,
+    /// All bits of a number are set if the side is the upper one.
+    Sides,
+    /// Numbers that all lanes share.
+    Constants,
+}
+
+/// An element of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place(pub Array, pub usize);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operand {
+    Register(Register),
+    Place(Place),
+}
+
+impl From<Register> for Operand {
+    fn from(register: Register) -> Self {
+        Self::Register(register)
+    }
+}
+
+impl From<Place> for Operand {
+    fn from(place: Place) -> Self {
+        Self::Place(place)
+    }
+}
+
+/// An operation on two numbers, or on the second of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    /// The result's former value plus the product, rounded once.
+    Fused,
+    /// The square root of the second number.
+    Root,
+    And,
+    /// The bits of the second number that the first lacks.
+    AndNot,
+    Or,
+    Xor,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Line {
+    Load(Register, Operand),
+    Store(Place, Register),
+    Apply(Operation, Register, Register, Operand),
+    /// The lower number of the second register, and a number from memory as the upper one.
+    LoadUpper(Register, Register, Place),
+    /// Stores the upper of two numbers.
+    StoreUpper(Place, Register),
+    /// The two lower numbers of both registers.
+    Join(Register, Register, Register),
+    /// The two upper ones of four numbers.
+    Part(Register, Register),
+    End,
+}
+
+/// Functions as lists of operations.
+#[derive(Debug)]
+pub struct Listing {
+    /// Operations, each with the numbers that it takes at once.
+    pub(super) lines: Vec<(usize, Line)>,
+    pub(super) isa: Isa,
+    /// How many numbers the next operations take at once.
+    width: usize,
+    /// How many numbers an element of an array has.
+    pub(super) lanes: usize,
+    /// How many of them a function takes.
+    pub(super) step: usize,
+    pub(super) constants: Vec<f64>,
+    places: HashMap<u64, usize>,
+    /// The length that each array but the constants needs, in elements.
+    pub(super) extents: [usize; 3],
+}
+
+impl Listing {
+    /// An empty list for numbers of so many lanes, a multiple of the numbers in a register.
+    pub fn new(isa: Isa, lanes: usize) -> Self {
+        let isa = isa.max(Isa::Avx2);
+        let width = match isa {
+            _ if lanes == 1 => 1,
+            Isa::Avx512 => 8,
+            _ => 4,
+        };
+        assert!(lanes.is_multiple_of(width), "{lanes} lanes in registers of {width}");
+        let (lines, constants, places) = Default::default();
+        Self { lines, isa, width, step: width, lanes, constants, places, extents: [0; 3] }
+    }
+
+    /// How many operations there are.
+    pub fn len(&self) -> usize {
+        self.lines.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.lines.is_empty()
+    }
+
+    /// The place of a constant.
+    pub fn constant(&mut self, value: f64) -> Place {
+        let at = *self.places.entry(value.to_bits()).or_insert_with(|| {
+            self.constants.push(value);
+            self.constants.len() - 1
+        });
+        Place(Array::Constants, at)
+    }
+
+    /// Loads a number, or copies a register.
+    pub fn load(&mut self, to: Register, from: impl Into<Operand>) {
+        let from = self.checked(from.into());
+        if from != Operand::Register(to) {
+            self.push(Line::Load(to, from));
+        }
+    }
+
+    /// Stores a number in the array `Work`.
+    pub fn store(&mut self, place: Place, from: Register) {
+        assert_eq!(place.0, Array::Work, "only the work is written");
+        self.checked(place.into());
+        self.push(Line::Store(place, from));
+    }
+
+    /// `to = a . b`; constants have to be loaded first.
+    pub fn apply(&mut self, operation: Operation, to: Register, a: Register, b: impl Into<Operand>) {
+        let b = self.checked(b.into());
+        assert!(!matches!(b, Operand::Place(Place(Array::Constants, _))), "a constant is not loaded");
+        self.push(Line::Apply(operation, to, a, b));
+    }
+
+    /// Lets the next operations take so many elements at once: 1, 2 or 4.
+    pub fn set_width(&mut self, width: usize) {
+        assert!(self.lanes == 1 && [1, 2, 4].contains(&width), "packets have one width");
+        self.width = width;
+    }
+
+    /// Loads two or four elements side by side.
+    pub fn gather(&mut self, to: Register, other: Register, places: &[Place]) {
+        for (to, pair) in [to, other].into_iter().zip(places.chunks(2)) {
+            self.set_width(1);
+            self.load(to, pair[0]);
+            self.checked(pair[1].into());
+            self.push(Line::LoadUpper(to, to, pair[1]));
+        }
+        if places.len() > 2 {
+            self.push(Line::Join(to, to, other));
+        }
+        self.set_width(places.len());
+    }
+
+    /// Stores two or four numbers in different places.
+    pub fn scatter(&mut self, places: &[Place], from: Register, other: Register) {
+        for (from, pair) in [from, other].into_iter().zip(places.chunks(2)) {
+            self.set_width(1);
+            self.store(pair[0], from);
+            self.checked(pair[1].into());
+            self.push(Line::StoreUpper(pair[1], from));
+            if from != other && places.len() > 2 {
+                self.push(Line::Part(other, from));
+            }
+        }
+        self.set_width(places.len());
+    }
+
+    /// Ends a function.
+    pub fn end(&mut self) {
+        self.push(Line::End);
+    }
+
+    fn push(&mut self, line: Line) {
+        self.lines.push((self.width, line));
+    }
+
+    /// The same operand, of which the arrays' lengths are taken.
+    fn checked(&mut self, operand: Operand) -> Operand {
+        if let Operand::Place(Place(array, at)) = operand
+            && let Some(extent) = self.extents.get_mut(array as usize)
+        {
+            *extent = (*extent).max(at + self.width.div_ceil(self.lanes));
+        }
+        operand
+    }
+}
