@@ -532,7 +532,7 @@ def test_a_pivot_that_is_said_with_an_error_is_a_beginning(made: Made, tmp_path:
     m = udd.track(made.path, layout=THREE, pivot=off, sigma={"pivot": 3.0}, refine=False)
     at, sigma, how = m.meta["calibration"]["pivot"]
     assert how == "rolling constraint" and np.hypot(*np.subtract(at, made.pivot)) < 0.1 and sigma < 0.1
-    with pytest.warns(UserWarning, match="the motion is believed"):
+    with pytest.warns(UserWarning, match="the contact of the motion is used"):
         udd.track(made.path, layout=THREE, pivot=[200.0, 90.0], sigma={"pivot": 2.0}, refine=False)
     # a disk at rest says nothing of where it would turn
     t = np.array([-1.0, 9.0])

@@ -43,13 +43,13 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        said = self.refusal(scope)
-        if said is None:
+        refusal = self.refusal(scope)
+        if refusal is None:
             await self.app(scope, receive, _with_headers(send))
         elif scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": 1008, "reason": said})
+            await send({"type": "websocket.close", "code": 1008, "reason": refusal})
         else:
-            await PlainTextResponse(said, 403)(scope, receive, _with_headers(send))
+            await PlainTextResponse(refusal, 403)(scope, receive, _with_headers(send))
 
     def refusal(self, scope: Scope) -> str | None:
         """Return the reason for refusing a request, in a sentence; None if it is accepted."""

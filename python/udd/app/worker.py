@@ -40,12 +40,12 @@ Tell = Callable[[dict[str, Any]], None]
 
 def main() -> None:
     """Do the job that is asked for."""
-    said = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what libraries print is no message
 
     def tell(message: dict[str, Any]) -> None:
-        said.write(json.dumps(message) + "\n")
-        said.flush()
+        answers.write(json.dumps(message) + "\n")
+        answers.flush()
 
     asked = json.loads(sys.stdin.readline())
     child_process.end_with_server()

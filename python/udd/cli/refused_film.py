@@ -19,7 +19,7 @@ def explain(
     commands: tuple[str, str],
     then: str = "",
 ) -> Path | None:
-    """Write the page of a film that the tracker refuses; return None if there is nothing to show.
+    """Write the page about a film that the tracker refuses.
 
     Parameters
     ----------

@@ -169,11 +169,11 @@ def run(args: argparse.Namespace) -> CommandResult:
         checked_path(args.overlay)
     header = {} if args.W is None else {"W": number("W", args.W, least=0.0)}
     options = _options(args)
-    said, before = ("", {}) if args.camera is None else _record(args)
+    report, before = ("", {}) if args.camera is None else _record(args)
     if args.click is not None:
         from .track_click import clicked
 
-        options, said, before = clicked(args, options)
+        options, report, before = clicked(args, options)
     detail: list[Any] = []
     try:
         m = _tracked(args, options, detail).with_meta(**header)
@@ -181,9 +181,9 @@ def run(args: argparse.Namespace) -> CommandResult:
         _explain(args, options, error)
         if args.click is None:
             raise
-        raise UddError(f"{error} ({said.strip()})") from None
+        raise UddError(f"{error} ({report.strip()})") from None
     text, data = _summary(m)
-    text, data = said + text, {**before, **data}
+    text, data = report + text, {**before, **data}
     if args.overlay is not None:
         from udd.tracking import overlay
 

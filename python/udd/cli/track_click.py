@@ -45,12 +45,12 @@ def clicked(args: argparse.Namespace, options: dict[str, Any]) -> tuple[dict[str
     from udd.tracking import click, write_config
     from udd.tracking.calibration.config import as_said
 
-    said = {} if args.config is None else dict(as_said(args.config)[1])
+    options_so_far = {} if args.config is None else dict(as_said(args.config)[1])
     given = {"disk_radius": args.disk_radius, **options}
-    said |= {name: value for name, value in given.items() if value is not None and name != "config"}
+    options_so_far |= {name: value for name, value in given.items() if value is not None and name != "config"}
     if is_terminal():
         print("udd: looking for a calm frame; a window opens then", file=sys.stderr)
-    answers = click(args.file, distance=args.distance, config=said)
+    answers = click(args.file, distance=args.distance, config=options_so_far)
     write_config(args.click, answers, comment=_HEAD.format(film=args.file.name))
     args.config = args.click
     line = f"what was clicked is written: {args.click}"

@@ -176,10 +176,10 @@ class Defects:
 
     def __repr__(self) -> str:
         """Only what is not as it should be."""
-        said = [
+        entries = [
             f"{f.name}={getattr(self, f.name)!r}" for f in fields(self) if getattr(self, f.name) != f.default
         ]
-        return f"Defects({', '.join(said)})"
+        return f"Defects({', '.join(entries)})"
 
 
 def source_of_pixels(camera: Camera, defects: Defects) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -226,11 +226,11 @@ def lit(light: Picture, time: float, defects: Defects) -> Picture:
 
 def _last(rows: Sequence[Sequence[float]], time: float, before: tuple[float, ...]) -> tuple[float, ...]:
     """Return the values of the last row whose time has come."""
-    said = before
+    values_now = before
     for begin, *values in rows:
         if time >= begin:
-            said = tuple(float(v) for v in values)
-    return said
+            values_now = tuple(float(v) for v in values)
+    return values_now
 
 
 def view_of(camera: Camera, time: float, defects: Defects) -> NDArray[np.float64]:

@@ -303,8 +303,8 @@ def _patches(layout: Sequence[Mapping[str, Any]] | None, radius: float) -> list[
         ]
     marks = read_layout([{key: value for key, value in mark.items() if key != "side"} for mark in layout])
     return [
-        Patch((at.real / radius, -at.imag / radius), float(said.get("side", side)) / radius, colour)
-        for at, colour, said in zip(marks.places, marks.colours, layout, strict=True)
+        Patch((at.real / radius, -at.imag / radius), float(mark.get("side", side)) / radius, colour)
+        for at, colour, mark in zip(marks.places, marks.colours, layout, strict=True)
     ]
 
 

@@ -83,8 +83,8 @@ class Correction:
         factor = self.factor if len(self.factor) else np.ones(n, np.complex128)
         shift = self.shift if len(self.shift) else np.zeros(n, np.complex128)
         gain = self.gain if len(self.gain) else np.ones(n)
-        said = (shift.real, shift.imag, np.angle(factor), np.abs(factor), gain)
-        return {name: np.round(x, 6) for name, x in zip(CAMERA_COLUMNS, said, strict=True)}
+        motion = (shift.real, shift.imag, np.angle(factor), np.abs(factor), gain)
+        return {name: np.round(x, 6) for name, x in zip(CAMERA_COLUMNS, motion, strict=True)}
 
     @property
     def meta(self) -> dict[str, Any]:

@@ -23,21 +23,21 @@ from udd.video.reader import Film, TrackError
 
 from .pixels_to_metres import Camera
 
-CLOSE_ENOUGH = 6.0  # mm: how well the support alone tells where the contact is
+CLOSE_ENOUGH = 6.0  # mm: error of a contact that the support alone shows
 BLOCKS = 20  # stretches of the film whose means are the independent pieces
-MINOR = 0.1  # share of what is said below which the film alone is named
-APART = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
+MINOR = 0.1  # share of the given place below which the film alone is named
+APART = 5.0  # standard errors between the given place and that of the film, beyond which one of them is wrong
 
 
 def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOptions) -> Camera:
-    """Scale and contact point, from the rolling constraint, by hand, or at worst from the support.
+    """Determine scale and contact: from the rolling constraint, as given, or at worst from the support.
 
-    A contact that is said with an error counts by it beside the rolling constraint's own.
+    A contact that is given with a standard error is averaged with that of the rolling constraint, by weight.
 
     Raises
     ------
     TrackError
-        Neither the motion nor a support tells where the contact is, and nobody said it.
+        Neither the motion nor a support shows the contact, and it is not given.
     """
     angle, centre = tracks.angle, tracks.centre
     good = np.isfinite(angle)
@@ -51,18 +51,18 @@ def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOp
         return Camera(size.value, size.sigma, size.origin, place, sigma, origin, drive, drive_sigma)
 
     if options.pivot is not None:
-        place, said = complex(state.look.lens.plane(complex(*options.pivot))), options.sigma.pivot
-        if contact is None or not said or not options.calibrate.pivot:
-            return camera(place, said / size.value, "given")
+        place, given_sigma = complex(state.look.lens.plane(complex(*options.pivot))), options.sigma.pivot
+        if contact is None or not given_sigma or not options.calibrate.pivot:
+            return camera(place, given_sigma / size.value, "given")
         of_film = float(contact.covariance[0, 0])
-        if abs(contact.place - place) < APART * np.hypot(said, np.sqrt(of_film)):
-            share = of_film / (of_film + said**2)  # of what is said
-            sigma = float(np.sqrt(share) * said) / size.value
+        if abs(contact.place - place) < APART * np.hypot(given_sigma, np.sqrt(of_film)):
+            share = of_film / (of_film + given_sigma**2)  # of the given place
+            sigma = float(np.sqrt(share) * given_sigma) / size.value
             how = "rolling constraint" if share < MINOR else "rolling constraint and given"
             return camera(contact.place + share * (place - contact.place), sigma, how)
         warnings.warn(
             f"the disk turns about a point {abs(contact.place - place):.0f} pixels from the pivot that is "
-            "given; the motion is believed",
+            "given; the contact of the motion is used",
             stacklevel=outside(),
         )
     if contact is not None:
@@ -139,8 +139,8 @@ def estimates(
 ) -> dict[str, Estimate]:
     """Return the value, the standard error and the origin of every item.
 
-    Lengths in m, times in s, the contact in pixels of the picture, the rest bare numbers; `how` is "found",
-    "none found" (0 is as good), "given" (also where it was switched off), or says from what.
+    Lengths are in m, times in s, the contact in pixels of the picture, other items without unit. `how` is
+    "found", "none found" (0 fits as well), "given" (also if it was switched off), or names the source.
     """
     out = dict(state.estimates)
     fixed = not options.calibrate.layout

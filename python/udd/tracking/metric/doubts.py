@@ -50,39 +50,39 @@ def doubts(gravity: ApparentGravity | None, camera: Camera, fps: float, turns: i
     turns : int
         Gaps across which the number of whole turns is in doubt.
     """
-    said = []
+    sentences = []
     if camera.pivot_from == "support":
-        said.append(
+        sentences.append(
             "the motion does not determine the contact point (the disk hardly turns, or turns steadily); "
             f"it is taken from the support, to about {1e3 * camera.pivot_sigma:.0f} mm: give pivot=(u, v) in "
             "pixels"
         )
     if turns:
         gaps = "a gap" if turns == 1 else f"{turns} gaps"
-        said.append(
+        sentences.append(
             f"beta may be whole turns off after {gaps} in which the disk turned unseen: see the flags"
         )
     if gravity is not None and gravity.is_known:
-        said += _by_gravity(gravity, camera, fps)
+        sentences += _by_gravity(gravity, camera, fps)
     elif _driven(camera) and _turns_of(float(np.angle(-1j * camera.drive))) != 0:
-        said.append("the drive does not go upward in the picture: is the film turned?")
-    return said
+        sentences.append("the drive does not go upward in the picture: is the film turned?")
+    return sentences
 
 
 def _by_gravity(gravity: ApparentGravity, camera: Camera, fps: float) -> list[str]:
-    said = []
+    sentences = []
     slower, sigma = gravity.slower, 0.5 * gravity.slower * gravity.sigma / abs(gravity.value)
     if abs(np.log(slower)) > max(OFF, APART * sigma / slower):
-        said.append(
+        sentences.append(
             f"gravity is {abs(gravity.value):.3g} m/s^2 by the film's clock and scale, not {STANDARD:g}: its "
             f"times are {slower:.2f} ± {sigma:.2g} times too long (then say fps={fps * slower:.4g}), or the "
             "disk's radius is another"
         )
     if _turns_of(gravity.lean) != 0:
-        said.append(
+        sentences.append(
             f"gravity points {np.degrees(abs(gravity.lean)):.0f} degrees off the picture's vertical: is the "
             "film turned?"
         )
     elif _driven(camera) and _turns_of(float(np.angle(-1j * camera.drive))) != 0:
-        said.append("the drive does not go upward, against gravity: is the wheel driven the other way?")
-    return said
+        sentences.append("the drive does not go upward, against gravity: is the wheel driven the other way?")
+    return sentences

@@ -128,9 +128,9 @@ def slow_parts(
 
 def text_of(parts: Sequence[SlowPart]) -> str:
     """Return the factors of the parts and where they begin, the first ones if there are many."""
-    said = [f"{p.factor:.3g} ± {p.sigma:.2g} from frame {p.first} on" for p in parts]
-    more = len(parts) - LISTED
-    return ", ".join(said[:LISTED]) + (f", and {more} more parts" if more > 0 else "")
+    texts = [f"{p.factor:.3g} ± {p.sigma:.2g} from frame {p.first} on" for p in parts]
+    rest = len(parts) - LISTED
+    return ", ".join(texts[:LISTED]) + (f", and {rest} more parts" if rest > 0 else "")
 
 
 def _rational(factor: float, sigma: float) -> float:
@@ -175,8 +175,8 @@ def _speeds(t: Array, away: NDArray[np.complex128], angle: Array, good: NDArray[
 
 def _noise(speed: Array) -> float:
     """Estimate the scatter of speeds from differences; every second or third may have another clock."""
-    apart = [np.median(np.abs(speed[lag:] - speed[:-lag])) for lag in (1, 2, 3, 5)]
-    return 1.48 * float(min(apart)) / 2**0.5
+    differences = [np.median(np.abs(speed[lag:] - speed[:-lag])) for lag in (1, 2, 3, 5)]
+    return 1.48 * float(min(differences)) / 2**0.5
 
 
 def _cut(speed: Array, noise: float) -> list[int]:

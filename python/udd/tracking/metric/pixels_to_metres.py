@@ -21,7 +21,7 @@ OUTSIDE = 0.005  # of the radius by which the contact must lie outside the disk
 NEAR_EDGE = 0.8  # of the radius; a disk that was last seen farther in is lost, not gone
 LEAP = 3.0  # times as fast as nearly all the time; a disk near its edge that moves so has been let go
 FAR = 0.02  # of the radius, that a leap goes at least
-CLOSE = 2.5  # usual intervals: over a longer step nobody knows how the disk turned
+CLOSE = 2.5  # usual intervals: over a longer step the rotation is unknown
 FEWEST = 20  # steps that show how far they usually are from rolling
 UNSEEN = 3  # frames without the disk at the end of a film
 ODD = 8.0  # times the usual misfit of a step
@@ -119,8 +119,8 @@ def pixels(m: Measurement) -> Pixels:
     lens = Lens(complex(bent[0], bent[1]), *bent[2:]) if bent else PLAIN
     places = np.array(m.meta["marks_px"], dtype=float) @ [1, 1j]
     radius = scale * float(m.meta["R"])
-    said = m.meta.get("marks_rgb", STANDARD.colours)  # an older file says nothing
-    colours = tuple((int(r), int(g), int(b)) for r, g, b in said)
+    codes = m.meta.get("marks_rgb", STANDARD.colours)  # an older file says nothing
+    colours = tuple((int(r), int(g), int(b)) for r, g, b in codes)
     ring = radius * np.exp(2j * np.pi * np.arange(73) / 72)
     centre = pivot + scale * (m["Y"] - 1j * m["Z"])
     marks = centre[:, None] + places * np.exp(1j * m["beta"])[:, None]

@@ -38,10 +38,10 @@ def count_turns(
 ) -> Turns:
     """Find the whole turns in each gap.
 
-    A frame shows the angle but for whole turns. For each number of turns, the smoothest path of the angle is
-    fitted that also brings the centre to its next place: a disk that rolls about `pivot` keeps (c - p) exp(-i
-    angle) - d integral exp(-i angle) dt. Its accelerations, against those that the disk has
-    where it is seen, say how well that number does.
+    A frame shows the angle but for whole turns. For each number of turns, a smooth path of the angle is
+    fitted that also brings the centre to its next place. A disk that rolls about `pivot` keeps (c - p)
+    exp(-i angle) - d integral exp(-i angle) dt. The accelerations of the path are compared with those in
+    the other frames.
 
     Parameters
     ----------
