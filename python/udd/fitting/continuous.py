@@ -29,24 +29,24 @@ def continuous(measurement: Any, model: Any) -> Any:
     is no angle of the model is reported and not changed. Any other object is returned as it is: a fit refuses
     it.
     """
-    if isinstance(measurement, Measurement):
-        if isinstance(model, Sequence):
-            model = next(iter(model), None)
-        result = steady(unwrapped(measurement, angles_of(model)))
-        left = wrapped_columns(result)
-        if left and isinstance(model, FormulaModel):
-            warnings.warn(
-                f"{left[0]} jumps by a turn, as an angle does, but is no angle of the model: the jumps count "
-                f'as motion. If it is an angle, pass angles=["{left[0]}"] to udd.Model.',
-                stacklevel=outside(),
-            )
-        return result
-    if not isinstance(measurement, (list, tuple)):
+    if isinstance(measurement, (list, tuple)):
+        models = model if isinstance(model, Sequence) else [model] * len(measurement)
+        if len(models) != len(measurement):
+            return measurement
+        return [continuous(part, each) for part, each in zip(measurement, models, strict=True)]
+    if not isinstance(measurement, Measurement):
         return measurement
-    models = model if isinstance(model, Sequence) else [model] * len(measurement)
-    if len(models) != len(measurement):
-        return measurement
-    return [continuous(part, each) for part, each in zip(measurement, models, strict=True)]
+    if isinstance(model, Sequence):
+        model = next(iter(model), None)
+    result = steady(unwrapped(measurement, angles_of(model)))
+    jumping = wrapped_columns(result)
+    if jumping and isinstance(model, FormulaModel):
+        warnings.warn(
+            f"{jumping[0]} jumps by a turn, as an angle does, but is no angle of the model: the jumps count "
+            f'as motion. If it is an angle, pass angles=["{jumping[0]}"] to udd.Model.',
+            stacklevel=outside(),
+        )
+    return result
 
 
 def steady(measurement: Measurement) -> Measurement:

@@ -46,7 +46,7 @@ def fit(
     the squared misfits in units of the noise, plus the squared model errors in units of an assumed model
     error. It reduces that assumed error in steps (weak-constraint multiple shooting). No data are
     differentiated, and chaotic records of any length can be fitted. The model's time counts from the
-    measurement's first row.
+    measurement's first row. Outliers have a smaller weight, and gross ones none (``result.noise.weight``).
 
     Parameters
     ----------

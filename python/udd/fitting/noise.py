@@ -44,7 +44,7 @@ class Noise(OneLine):
     blur : ndarray (m,)
         Growth with the angular speed, in the channel's unit per rad/s.
     weight : ndarray (n,)
-        Weight of each frame. It is 1, or less for an outlier.
+        Weight of each frame. It is 1, less for an outlier (Huber), and 0 for a gross one.
     memory : ndarray (m,)
         Lag-1 autocorrelation of the noise.
     """

@@ -81,8 +81,8 @@ def free_parameters(
             if free is None and name not in spread and name not in _amplitudes(of):
                 continue  # a drive of zero stays fixed
             label = name if film is None else f"{name}[{film}]"
-            sd = np.inf if name in _amplitudes(of) else spread.get(name, np.inf)
-            result.append(Free(label, "model", order.index(name), of.parameters[name], sd, film))
+            mean, sd = of.parameters[name], spread.get(name, np.inf)
+            result.append(Free(label, "model", order.index(name), mean, sd, film))
     for film in range(len(models)):
         for name in wanted:
             role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
