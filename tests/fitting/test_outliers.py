@@ -46,6 +46,17 @@ def test_outliers_of_a_filmed_pendulum_do_not_hurt(size: float) -> None:
     assert 0.9 < result.errors["k0"] / clean.errors["k0"] < 1.2
 
 
+def test_an_outlier_at_the_end_that_the_fit_alone_shows_does_not_hurt() -> None:
+    """It is no longer than 20 steps from the frames before."""
+    measured = swing(0.0)
+    theta = measured["theta"].copy()
+    theta[-1] += 0.4
+    result = udd.fit(udd.Measurement(T, {"theta": theta}), udd.Pendulum(1.0, k0=0.03))
+    assert not result.record.odd.any()
+    assert result.noise.weight[-1] == 0.0
+    assert 0.8 < result.scatter < 1.3
+
+
 @pytest.mark.parametrize("size", [1.0, 1e6])
 def test_a_forecast_ignores_an_outlier_in_its_window(size: float) -> None:
     clean, result = (udd.forecast(spring(s), SPRING, 4.0, start=19.95, members=60) for s in (0.0, size))

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 #: Share of frames with normal noise below the Huber threshold; a frame beyond it counts less.
 _HONEST = 0.99
+#: Distance, in units of that threshold, beyond which a frame does not count: about 100 standard deviations.
+_GROSS = 30.0
 #: Standard errors above which an autocorrelation is significant, and the value above which it is motion.
 _SURE, _MOTION = 4.0, 0.8
 #: Frequencies over which the misfits' power is averaged.
@@ -100,8 +102,9 @@ def estimated(fit: Fit) -> Noise:
     numbers = np.arange(1, seen.shape[1] + 1)  # of channels that a frame may show
     typical = np.median(distance[seen.any(axis=1)]) / np.sqrt(chi_squared.ppf(0.5, numbers))
     limit = (np.sqrt(chi_squared.ppf(_HONEST, numbers)) * np.maximum(typical, 1.0))[channels - 1]
-    # An outlier that the fit confirms stays without weight: its chi2 would hide that of all other frames.
-    less = np.where(record.odd, 0.0, limit / np.maximum(distance, limit))
+    # A gross outlier has no weight: its chi2 would hide that of all other frames.
+    is_gross = record.odd | (distance > _GROSS * limit)
+    less = np.where(is_gross, 0.0, limit / np.maximum(distance, limit))
     weight = np.where(distance > limit, less, 1.0)
     # The variance comes from the frames within the limit, in which normal noise has this share of its
     # variance.
