@@ -281,6 +281,9 @@ def forecast(
     length = float(profile.fit.window * unit if window is None else window)
     record = record_of(past, fitted.model if profile.written else None)
     film = _film(fitted, measurement, film)
+    if any(_same(fitted.measurements[film], each) for each in (measurement, past)):
+        is_gross = (fitted.noise.weight == 0.0) & (fitted.record.film == film)
+        record = replace(record, odd=record.odd | np.isin(record.row, fitted.record.row[is_gross]))
     part, origin = _window(fitted, film, record, length)
 
     scale = max(fitted.scatter, 1.0) ** 0.5
