@@ -1,4 +1,4 @@
-//! Where formulas have kinks: the surfaces that runs land on.
+//! The kinks of formulas: the surfaces that runs land on.
 
 use std::ops::Range;
 
@@ -58,7 +58,7 @@ impl Kink {
         }
     }
 
-    /// Whether its value jumps at the surface.
+    /// Returns true if its value jumps at the surface.
     fn jumps(self) -> bool {
         matches!(self, Kink::Sign | Kink::Where)
     }
@@ -69,9 +69,9 @@ impl Kink {
 pub struct Kinks {
     /// Their functions. One may depend on the sides of those before it.
     pub surfaces: Vec<Expression>,
-    /// Whether a formula jumps there.
+    /// True if a formula jumps there.
     pub jumps: Vec<bool>,
-    /// Whether their functions are no faster than the state.
+    /// True if their functions are no faster than the state.
     pub steady: Vec<bool>,
     /// Those that a law may [slide](crate::model::sliding_mode) on: where it jumps at a linear function of the states
     /// in the rate of one of them.
@@ -84,7 +84,7 @@ impl Kinks {
     /// Finds the kinks of a formula and writes it on the sides of their surfaces. Kinks beyond the most surfaces
     /// that a model can have stay comparisons.
     pub fn of(&mut self, formula: &mut Expression) {
-        // Where each number on the stack begins.
+        // The start of each number on the stack.
         let mut starts: Vec<usize> = Vec::new();
         let mut next = 0;
         while next < formula.ops.len() {
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
     use crate::formula::Names;
 
-    /// Whether the function of a formula's last surface is steady.
+    /// Returns true if the function of a formula's last surface is steady.
     fn steady(text: &str) -> bool {
         let (states, parameters) = (["x", "v"].map(str::to_owned), ["k"].map(str::to_owned));
         let names = Names { states: &states, parameters: &parameters, inputs: &[], rates: false };

@@ -24,14 +24,14 @@ pub const DEEPEST: usize = 100;
 /// The largest whole exponent.
 pub const HIGHEST: i32 = 1024;
 
-/// Whether a name means something in every formula, so that nothing else can be called so.
+/// Returns true if a name means something in every formula, so that nothing else can be called so.
 pub fn is_reserved(name: &str) -> bool {
     let unary = parse::FUNCTIONS.iter().any(|(function, _)| *function == name);
     let binary = parse::BINARY.iter().any(|(function, _)| *function == name);
     unary || binary || name == parse::WHERE || parse::SPLINES.contains(&name) || name == "t" || name == "pi"
 }
 
-/// The names that a formula may use, beside the time `t`, the number `pi` and the functions.
+/// The names that a formula may use, in addition to the time `t`, the number `pi` and the functions.
 #[derive(Clone, Copy, Debug)]
 pub struct Names<'a> {
     /// The state's components.
@@ -39,7 +39,7 @@ pub struct Names<'a> {
     pub parameters: &'a [String],
     /// Measured inputs.
     pub inputs: &'a [String],
-    /// Whether `name'` is the rate of a component of the state.
+    /// True if `name'` is the rate of a component of the state.
     pub rates: bool,
 }
 
@@ -244,7 +244,7 @@ impl Expression {
         })
     }
 
-    /// Whether it is a linear function of the state and a constant, with factors that neither time nor inputs change.
+    /// Returns true if it is a linear function of the state and a constant, with factors that neither time nor inputs change.
     pub fn is_affine(&self) -> bool {
         self.degree(2, false) == 1
     }

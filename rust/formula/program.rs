@@ -10,7 +10,7 @@ use crate::machine::Codes;
 use crate::scalar::{Isa, Scalar};
 use crate::sides::{MAX_SURFACES, Sides};
 
-/// Where formulas are evaluated.
+/// The point at which formulas are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a, S> {
     pub t: S,
@@ -157,12 +157,12 @@ impl Program {
         self.results.len()
     }
 
-    /// Whether there are none.
+    /// Returns true if there are none.
     pub fn is_empty(&self) -> bool {
         self.results.is_empty()
     }
 
-    /// Whether they need the rates of the state.
+    /// Returns true if they need the rates of the state.
     pub fn has_rates(&self) -> bool {
         self.leaves.iter().any(|leaf| matches!(leaf, Leaf::Rate(_)))
     }

@@ -8,7 +8,7 @@ pub struct Spline {
     /// Which parameter is the first coefficient; the others follow.
     pub first: usize,
     pub count: usize,
-    /// Where its knots begin and how many there are per unit.
+    /// Its first knot, and the number of knots per unit.
     pub low: f64,
     pub per: f64,
     /// True if the curve is periodic. Otherwise it keeps its last value beyond its ends.

@@ -60,7 +60,7 @@ pub struct Found<R: Real> {
     pub dt: R,
     /// A later place where the sign is wrong on the polynomial.
     pub high: R,
-    /// Where the target's function counts as zero.
+    /// The size below which the target's function counts as zero.
     pub zero: R,
     /// As far after the start of the step as there is surely no crossing, in lanes where that is not its end.
     pub cut: R,
@@ -292,7 +292,7 @@ where
     }
 }
 
-/// Where a lane first crosses a target.
+/// The place at which a lane first crosses a target.
 enum Located {
     Unknown,
     Nowhere,

@@ -97,9 +97,9 @@ pub struct Integrator<M, S: Scalar, const D: usize, E = Tolerance, K = Dopri5<S,
     run: Run<S, D>,
 }
 
-/// Where a run stands. Its rare work is compiled once for each kind of number.
+/// The state of a run. Its rare work is compiled once for each kind of number.
 struct Run<S: Scalar, const D: usize> {
-    /// Whether lanes end on the wall.
+    /// True if lanes end on the wall.
     wall: bool,
     at: StepStart<S, D>,
     /// The size of the next trial step, of the sign of the direction.
@@ -110,15 +110,16 @@ struct Run<S: Scalar, const D: usize> {
     landing: EventIteration<S::Real>,
     /// Sides changed since time last moved on.
     flips: S::Real,
-    /// When the run began; jumps of the law since the time beside.
+    /// When the run began.
     start: S::Real,
+    /// The number of jumps of the law, and the time since which they count.
     jumps: (S::Real, S::Real),
     /// The state is on a surface to within rounding, which leaves its side open.
     undecided: S::Mask,
     work: Work<S::Real>,
 }
 
-/// The work lane by lane: steps accepted and rejected, trials, and evaluations beside those in trials.
+/// The work lane by lane: steps accepted and rejected, trials, and evaluations outside of trials.
 #[derive(Clone, Copy, Debug)]
 struct Work<R> {
     accepted: R,

@@ -4,7 +4,7 @@ use crate::model::{AnySystem, MOST_PROBES, StepStart, System};
 use crate::scalar::{Scalar, vector};
 use crate::tolerance::ErrorNorm;
 
-/// Where a step is looked at: a long one, as of a high order, more closely.
+/// The parts of a step that are examined: more of them in a long step, as of a high order.
 pub(super) const QUARTERS: &[f64] = &[0.25, 0.5, 0.75, 1.0];
 pub(super) const EIGHTHS: &[f64] = &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
@@ -25,9 +25,9 @@ pub trait Method<S: Scalar, const D: usize> {
     const ORDER: i32;
     /// Evaluations of the rates in a trial.
     const EVALUATIONS: usize;
-    /// Whether the polynomial is as accurate as the new state, so that a step can end anywhere on it.
+    /// True if the polynomial is as accurate as the new state, so that a step can end anywhere on it.
     const SERIES: bool;
-    /// Where within a step switching surfaces are looked at, so that one crossed twice is seen too.
+    /// The parts of a step at which switching surfaces are evaluated, so that one crossed twice is noticed, too.
     const PROBES: &'static [f64];
 
     /// How large a negative eigenvalue of the law may be, times a step's size, before the steps become unstable.

@@ -136,7 +136,7 @@ pub struct Rodas<'a, const D: usize> {
     /// The derivatives at any time and state. The type of the law is erased, as in all code that is compiled for this
     /// method.
     slopes_at: Box<SlopesAt<'a, D>>,
-    /// Where the derivatives are known, and what they are.
+    /// The place of the derivatives that are known, and their values.
     known: Option<StepStart<f64, D>>,
     slopes: Slopes<D>,
     /// The last trial: its size, and its polynomial's coefficients over the part of it.

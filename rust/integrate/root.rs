@@ -28,7 +28,7 @@ pub fn bracketed<R: Real>(
         let c = if count % 3 == 0 { (a + b).scale(0.5) } else { b - fb * (b - a) / (fb - fa) };
         let fc = f(c);
         let crossed = differ::<R>(fc, fb);
-        // Where the end `a` stays, weigh it down, so that it too is replaced soon.
+        // If the end `a` stays, weigh it down, so that it is replaced soon, too.
         let weight = R::one() - fc / fb;
         let weight = R::select(R::zero().less(weight), weight, R::constant(0.5));
         let kept = (a, fa * weight);
@@ -39,7 +39,7 @@ pub fn bracketed<R: Real>(
     b
 }
 
-/// Where one of the two is negative and the other is not.
+/// True if one of the two is negative and the other is not.
 #[inline(always)]
 fn differ<R: Real>(a: R, b: R) -> R::Mask {
     let (a, b) = (a.less(R::zero()), b.less(R::zero()));

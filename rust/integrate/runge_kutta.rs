@@ -90,7 +90,7 @@ fn combined<S: Scalar, const D: usize, const N: usize>(
     components!(n => combine(weights, stages, count, n).times(h))
 }
 
-/// Whether what is done with a number is long, as with derivatives that are not in vector registers: such steps are made
+/// Returns true if operations on a number are long, as with derivatives that are not in vector registers: such steps are made
 /// of functions and loops, not written out.
 const fn apart<S: Scalar>() -> bool {
     size_of::<S>() > size_of::<S::Real>() && S::Real::LANES == 1

@@ -15,7 +15,7 @@ const GRAZE: f64 = 1e-5;
 ///
 /// A neighbour at `x + d` meets the surface `g = 0` later by `delay = -(g.d)/(dg/dt)`. Until then it moves
 /// with the rate `f-` instead of `f+`, so its distance becomes `R(d + f- delay) - f+ delay`, where `R` is
-/// the derivative of the switch's own map of the state. Where the switch leaves the state as it is,
+/// the derivative of the switch's own map of the state. If the switch does not change the state,
 /// this is the saltation matrix `1 + (f+ - f-) n^T/(n^T f-)` (Leine & Nijmeijer, Dynamics and Bifurcations
 /// of Non-Smooth Mechanical Systems, 2004, ch. 7); `g` may depend on time and on parameters too.
 ///

@@ -21,7 +21,7 @@ pub struct PiController<R: Real> {
     alpha: f64,
     /// Binary logarithm, a rough one, of the error norm of the last accepted step.
     previous: R,
-    /// Whether the last trial was rejected; the step does not grow right after.
+    /// True if the last trial was rejected; the step does not grow right after.
     rejected: R::Mask,
 }
 
@@ -38,7 +38,7 @@ impl<R: Real> PiController<R> {
         self.rejected = self.rejected.and(lanes.not());
     }
 
-    /// Where a step with this error norm is accepted, and the factor for the next step size; only
+    /// The lanes in which a step with this error norm is accepted, and the factor for the next step size; only
     /// `lanes` are remembered.
     #[inline(always)]
     pub fn judge(&mut self, error: R, lanes: R::Mask) -> (R::Mask, R) {
@@ -100,6 +100,6 @@ fn curved_step<R: Real, const D: usize>(
     let curved = ((constant(0.01) / steepest).ln().scale(1.0 / f64::from(order))).exp();
     let h1 = R::select(flat, h0.scale(1e-3).max(constant(1e-6)), curved);
     let h = h1.min(h0.scale(100.0));
-    // Where the rate is infinite, or nearly so, it is no step.
+    // If the rate is infinite, or nearly so, it is no step.
     R::select(h.finite().and(R::zero().less(h)), h, constant(1e-6))
 }

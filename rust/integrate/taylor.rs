@@ -25,7 +25,7 @@ pub fn order(tolerance: &Tolerance) -> usize {
 /// The Taylor series of the solution, from the model's [tape](crate::tape).
 ///
 /// A step is as long as the series' last terms allow, so none is rejected for its error; its polynomial
-/// is as accurate as its end. Tangents share the state's radius of convergence and so its steps. Where the
+/// is as accurate as its end. Tangents share the state's radius of convergence and so its steps. If the
 /// coefficients are no numbers, or no step along their polynomial obeys the law, no step is taken: see
 /// [`Failure::NoSeries`](super::Failure::NoSeries).
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ pub struct Taylor<'a, S: Scalar, const D: usize> {
     tape: &'a Tape<D>,
     parameters: Vec<S>,
     jets: Jets<S, D, COEFFICIENTS>,
-    /// Whether what does not change along a solution is evaluated.
+    /// True if what does not change along a solution is evaluated.
     held: bool,
 }
 
@@ -47,9 +47,8 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// Halves steps whose polynomial does not obey the law at their end; fails where none does.
     ///
     /// If a law has nearly levelled off, as tanh does, its terms are too small to show the distance of its poles. The
-    /// same holds for a series with gaps, such as one in powers of t^4, if the last terms fall into one. Where it has
-    /// levelled
-    /// off entirely the polynomial may be wrong on the way only, and so it may be in a law with splines.
+    /// same holds for a series with gaps, such as one in powers of t^4, if the last terms fall into one. If it has
+    /// levelled off entirely, the polynomial may be wrong on the way only, and so it may be in a law with splines.
     #[inline(never)]
     fn obey(&mut self, at: &StepStart<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
         let from = vector!(S::Real, D; n => at.x[n].real());
@@ -123,7 +122,7 @@ impl<S: Scalar, const D: usize> Method<S, D> for Taylor<'_, S, D> {
     const SERIES: bool = true;
     const PROBES: &'static [f64] = EIGHTHS;
 
-    /// Where the exponential series up to this order leaves the unit disk, to 2 %.
+    /// The number at which the exponential series up to this order leaves the unit disk, to 2 %.
     fn stable(&self) -> f64 {
         1.3 + 0.377 * self.jets.order() as f64
     }
@@ -206,7 +205,7 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
     #[inline(always)]
     fn run<V: InstructionSet>(self) -> Trial<S, D> {
         let Self { method, at, h, norm } = self;
-        // Divisions: beside the series they cost little.
+        // Divisions: compared with the series they cost little.
         let weights = norm.weights(&at.x);
         let jets = &mut method.jets;
         jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);

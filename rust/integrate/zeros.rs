@@ -1,4 +1,4 @@
-//! Where a function changes its sign within a step.
+//! The places at which a function changes its sign within a step.
 //!
 //! Along a step every function of time and state is one of `s`, the part of the step that has passed. A piece of the
 //! step is settled where interval arithmetic proves that the function has no zero there, or that its slope has none;
@@ -31,7 +31,7 @@ pub trait Curve {
 /// A piece of a step on whose ends a function has different signs; it has no other change of sign there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bracket {
-    /// Where, and the value there.
+    /// The place, and the value there.
     pub low: (f64, f64),
     pub high: (f64, f64),
 }
@@ -94,7 +94,7 @@ pub fn sign_changes(
     1.0
 }
 
-/// Whether the function has at most one change of sign between `a` and `b`, or changes by rounding alone.
+/// Returns true if the function has at most one change of sign between `a` and `b`, or changes by rounding alone.
 fn is_settled(
     curve: &mut dyn Curve,
     (a, fa): (f64, f64),

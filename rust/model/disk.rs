@@ -28,9 +28,9 @@ pub struct Disk<S> {
     pub friction: Friction<S>,
     /// The effects, with their parameter values.
     pub effects: Vec<Term<S>>,
-    /// Whether the run ends where the contact reaches the disk's edge, `Y^2 + Z^2 = R^2`.
+    /// True if the run ends where the contact reaches the disk's edge, `Y^2 + Z^2 = R^2`.
     pub edge: bool,
-    /// Whether dry friction can hold it at rest.
+    /// True if dry friction can hold it at rest.
     pub sticking: Sticking,
 }
 

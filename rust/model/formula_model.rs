@@ -38,7 +38,7 @@ impl Law {
     }
 }
 
-/// Where the values of a model's inputs come from.
+/// The source of the values of a model's inputs.
 #[derive(Clone, Debug)]
 enum InputValues<S> {
     None,

@@ -54,7 +54,7 @@ impl Signal {
         }
     }
 
-    /// Whether it jumps at a sample.
+    /// Returns true if it jumps at a sample.
     fn jumps(&self) -> bool {
         self.pieces.iter().any(|piece| piece[1..] == [0.0; 3])
     }
@@ -115,9 +115,9 @@ pub struct Inputs<S> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signals {
     signals: Arc<[Signal]>,
-    /// Where none is delayed.
+    /// The timeline if no input is delayed.
     timeline: Option<Arc<Timeline>>,
-    /// Whether one jumps that is.
+    /// True if a delayed input jumps.
     jumps: bool,
 }
 
@@ -134,7 +134,7 @@ impl Signals {
         self.signals.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if it is empty.
     pub fn is_empty(&self) -> bool {
         self.signals.is_empty()
     }
@@ -166,7 +166,7 @@ impl<S: Scalar> Inputs<S> {
         self.signals.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if it is empty.
     pub fn is_empty(&self) -> bool {
         self.signals.is_empty()
     }
@@ -179,7 +179,7 @@ impl<S: Scalar> Inputs<S> {
         Piece { origin: S::constant(origin) + self.delays[k], coefficients }
     }
 
-    /// Whether the interval after this time, or before it, is an odd one.
+    /// Returns true if the interval after this time, or before it, is an odd one.
     pub fn side(&self, t: f64, after: bool) -> bool {
         let knots = &self.timeline.knots;
         let interval =
@@ -216,7 +216,7 @@ impl<S: Scalar> Inputs<S> {
         if knot % 2 == 0 { since } else { -since }
     }
 
-    /// Whether an input jumps whose delay may be differentiated by: a neighbour then meets the jump at another time.
+    /// Returns true if an input jumps whose delay may be differentiated by: a neighbour then meets the jump at another time.
     pub fn jumps(&self) -> bool {
         self.jumps
     }

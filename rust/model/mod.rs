@@ -1,7 +1,7 @@
 //! What is integrated.
 //!
 //! A model is a right-hand side written once, generic over the [`Scalar`]: [`Dle`], [`Disk`],
-//! [`Pendulum`]. Where its law has a kink it names a surface, a smooth function of the state that is
+//! [`Pendulum`]. If its law has a kink it names a surface, a smooth function of the state that is
 //! zero there; the integrator freezes the side of each surface within a step, so that every step sees
 //! a smooth law, and lands on the surface before it changes the side.
 
@@ -37,7 +37,7 @@ pub use crate::sides::{MAX_SURFACES, Sides, choose};
 
 /// A system of `D` ordinary differential equations.
 pub trait System<S: Scalar, const D: usize>: Sync {
-    /// Whether there is neither a switching surface nor a wall: what deals with them is then not compiled.
+    /// True if there is neither a switching surface nor a wall: what deals with them is then not compiled.
     const SMOOTH: bool = false;
 
     /// The right-hand side at time `t` and state `x`, each piecewise law continued smoothly from
@@ -81,12 +81,12 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     fn settle(&self, _t: S, _x: &[S; D], _sides: &mut Sides<S>) {}
 
     /// Passes surface `j`, on which the state lies, in the lanes `here`: changes its side and, where the
-    /// law asks for it, other sides and the state (a contact that comes to rest sticks).
+    /// law asks for it, other sides and the state (a contact that stops sticks).
     fn switch(&self, j: usize, _t: S, _x: &mut [S; D], sides: &mut Sides<S>, here: S::Mask) {
         sides[j] = choose(here, sides[j].not(), sides[j]);
     }
 
-    /// Whether the rates or the state jump at surface `j`. Elsewhere the law is continuous.
+    /// Returns true if the rates or the state jump at surface `j`. Elsewhere the law is continuous.
     fn jumps(&self, _j: usize) -> bool {
         false
     }
@@ -260,7 +260,7 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
     /// The system it builds.
     type Built<S: Scalar>: System<S, D>;
 
-    /// Whether its rates are compiled for packets, which methods without series need: worth it for a short law only.
+    /// True if its rates are compiled for packets, which methods without series need: worth it for a short law only.
     const PACKETS: bool = false;
 
     /// Returns true if many runs can go in packets, one in each lane: the law is smooth and has no wall. Others run one by
@@ -296,7 +296,7 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
         0
     }
 
-    /// Whether it has inputs of which nothing was measured.
+    /// Returns true if it has inputs of which nothing was measured.
     fn is_open(&self) -> bool {
         false
     }

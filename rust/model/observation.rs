@@ -13,7 +13,7 @@ struct Channel {
     angle: bool,
 }
 
-/// Channels that see formulas of state, rates, parameters and time. Where there are none the state is seen as it is.
+/// Channels that see formulas of state, rates, parameters and time. If there are none, the channels are the state itself.
 ///
 /// ```
 /// use udd::formula::Names;
@@ -48,7 +48,7 @@ impl Observation {
         Ok(Self { channels: channels.into(), seen: Arc::new(Program::of(&formulas)) })
     }
 
-    /// Whether the state is seen as it is.
+    /// Returns true if the state is seen as it is.
     pub fn is_empty(&self) -> bool {
         self.channels.is_empty()
     }

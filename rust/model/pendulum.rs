@@ -25,7 +25,7 @@ pub struct Pendulum<S> {
     pub k0: S,
     /// The effects, with their parameter values.
     pub effects: Vec<Term<S>>,
-    /// Whether dry friction can hold it at rest.
+    /// True if dry friction can hold it at rest.
     pub sticking: Sticking,
 }
 

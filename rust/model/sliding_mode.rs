@@ -23,7 +23,7 @@ pub type Law<'a, S> = &'a dyn Fn(&Sides<S>, &mut [S]);
 /// A surface `offset + gradient x = 0` on which a law may slide.
 ///
 /// Its side is true where the function is positive. While the law slides it is false and that of `mode` true,
-/// which tells this from the sides of a start, which are all true until they are known.
+/// which distinguishes this from the sides of a start, which are all true until they are known.
 #[derive(Clone, Debug)]
 pub struct SlidingSurface<S> {
     /// The numbers of the surface and of the one between sliding and not.
@@ -36,7 +36,7 @@ pub struct SlidingSurface<S> {
 /// The rates on all surfaces that the law slides on.
 struct Balance<S> {
     rates: [S; MOST],
-    /// Where between its two sides the law is taken, from -1 to 1.
+    /// The place between its two sides at which the law is taken, from -1 to 1.
     between: [S; MAX_SLIDING],
     /// How the difference of a surface's two sides moves the state away from it; negative where it brings it back.
     away: [S; MAX_SLIDING],
@@ -51,7 +51,7 @@ impl<S: Scalar> SlidingSurface<S> {
         sum
     }
 
-    /// Whether the law slides here.
+    /// Returns true if the law slides here.
     pub fn slides(&self, sides: &Sides<S>) -> S::Mask {
         sides[self.mode].and(sides[self.surface].not())
     }
@@ -64,7 +64,7 @@ impl<S: Scalar> SlidingSurface<S> {
         }
     }
 
-    /// Whether a state is on the surface to rounding.
+    /// Returns true if a state is on the surface to rounding.
     fn holds(&self, x: &[S]) -> S::Mask {
         let size = |a: S| S::select(a.less(S::zero()), -a, a);
         let mut terms = size(self.offset);
@@ -193,7 +193,7 @@ pub fn settle<S: Scalar>(surfaces: &[SlidingSurface<S>], x: &[S], sides: &mut Si
     }
 }
 
-/// Where a state is on a surface to which the law points from both sides, whether it holds or not.
+/// True if a state is on a surface to which the law points from both sides, whether it holds or not.
 pub fn attracts<S: Scalar>(
     surfaces: &[SlidingSurface<S>],
     x: &[S],
@@ -224,7 +224,7 @@ fn speeds<S: Scalar>(surfaces: &[SlidingSurface<S>], i: usize, sides: &Sides<S>,
     })
 }
 
-/// Whether the mean of both sides leaves surface `i` upwards.
+/// Returns true if the mean of both sides leaves surface `i` upwards.
 fn points_up<S: Scalar>(
     surfaces: &[SlidingSurface<S>],
     i: usize,

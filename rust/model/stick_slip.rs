@@ -1,7 +1,7 @@
 //! A contact that sticks: the modes of set-valued dry friction, and the switches between them.
 //!
-//! A body slides one way or the other, or it sticks; which one is a side like any other. Sliding comes to
-//! rest on the surface `Omega = 0`: there it sticks if dry friction can hold the other torques, else the
+//! A body slides one way or the other, or it sticks; which one is a side like any other. Sliding stops
+//! on the surface `Omega = 0`: there it sticks if dry friction can hold the other torques, else the
 //! torque carries it through. It is let go where the torque reaches what friction can hold. With
 //! Karnopp's band it also sticks, from any speed inside the band, as soon as friction can hold it.
 
@@ -12,7 +12,7 @@ use crate::scalar::{Mask, Scalar};
 /// The surface `Omega = 0`.
 pub const REVERSAL: usize = 0;
 
-/// Whether and how a model's contact sticks.
+/// The way in which a model's contact sticks, if it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sticking {
     Never,
@@ -89,7 +89,7 @@ pub trait Slider<S: Scalar, const D: usize> {
         S::select(open, margin(torque, dry.hold), -S::one())
     }
 
-    /// Whether the function of [`Slider::BAND`] or [`Slider::STUCK`] changes no faster than the state: a constant does,
+    /// Returns true if the function of [`Slider::BAND`] or [`Slider::STUCK`] changes no faster than the state: a constant does,
     /// the torque on a contact at rest need not.
     #[inline(always)]
     fn is_slow(&self, j: usize, sides: &Sides<S>) -> bool {
@@ -141,7 +141,7 @@ pub trait Slider<S: Scalar, const D: usize> {
         }
     }
 
-    /// Whether the law jumps at surface `j`.
+    /// Returns true if the law jumps at surface `j`.
     fn contact_jumps(&self, j: usize) -> bool {
         match self.sticking() {
             Sticking::Never => false,

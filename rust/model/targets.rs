@@ -44,7 +44,7 @@ where
     S: Scalar,
     M: System<S, D>,
 {
-    /// Whether there is such a target.
+    /// Returns true if there is such a target.
     #[inline(always)]
     pub fn has(&self, target: usize) -> bool {
         target < self.system.surfaces() || target == WALL && self.wall
@@ -60,7 +60,7 @@ where
         S::Real::select(self.at.sides[target], value, -value)
     }
 
-    /// Whether the target's function is as slow as the state.
+    /// Returns true if the target's function is as slow as the state.
     #[inline(always)]
     pub fn is_steady(&self, target: usize) -> bool {
         target == WALL || self.system.is_steady(target, &self.at.sides)

@@ -135,7 +135,7 @@ impl<S: Scalar> Law<S> {
     }
 }
 
-/// Where a series starts.
+/// The start of a series.
 struct Start<S> {
     law: Law<S>,
     /// Omega, Y and Z.

@@ -96,12 +96,12 @@ fn aside<S: Scalar, T: Number, const N: usize>(
     true
 }
 
-/// Whether orders are unrolled: not where tangents make every operation long.
+/// Returns true if orders are unrolled: not where tangents make every operation long.
 const fn worthwhile<S: Scalar, const N: usize>() -> bool {
     N == HIGH + 1 && size_of::<S>() <= 2 * size_of::<S::Real>()
 }
 
-/// Whether numbers with derivatives fill two registers for each part.
+/// Returns true if numbers with derivatives fill two registers for each part.
 const fn doubled<S: Scalar>() -> bool {
     S::Real::LANES > LANES && size_of::<S>() > size_of::<S::Real>()
 }

@@ -133,8 +133,8 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(*isa, Interpretation { program, work, order, held, t, sides });
     }
 
-    /// Where the law has [levelled off](Tape::levels_off) to the last bit: its series then knows nothing of what is
-    /// beyond.
+    /// True if the law has [levelled off](Tape::levels_off) to the last bit: its series then contains nothing of the
+    /// motion beyond.
     #[inline(never)]
     pub fn flat(&self, tape: &Tape<D>) -> S::Mask {
         let mut flat = S::mask(false);

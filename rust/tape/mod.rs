@@ -67,36 +67,36 @@ impl<const D: usize> Tape<D> {
         Self { program, ..self.clone() }
     }
 
-    /// Whether the law can level off so far that the terms of its series vanish, as exp and tanh do.
+    /// Returns true if the law can level off so far that the terms of its series vanish, as exp and tanh do.
     #[inline(always)]
     pub fn levels_off(&self) -> bool {
         self.levels_off
     }
 
-    /// Whether the law has splines: then a series is that of one of their cells.
+    /// Returns true if the law has splines: then a series is that of one of their cells.
     #[inline(always)]
     pub fn is_in_pieces(&self) -> bool {
         self.in_pieces
     }
 
-    /// Whether [held](Tape::held) values depend on the sides of surfaces.
+    /// Returns true if [held](Tape::held) values depend on the sides of surfaces.
     #[inline(always)]
     pub fn switches_held(&self) -> bool {
         self.switches_held
     }
 
-    /// Whether the law has measured inputs, whose [pieces](Jets::set_inputs) a step has to know.
+    /// Returns true if the law has measured inputs, whose [pieces](Jets::set_inputs) a step has to know.
     #[inline(always)]
     pub fn is_driven(&self) -> bool {
         self.driven
     }
 
-    /// Whether its series are computed by a program of their own.
+    /// Returns true if its series are computed by a program of their own.
     pub fn is_unrolled(&self) -> bool {
         self.known != specialised::Specialised::Not
     }
 
-    /// Whether a method that needs no power series may do better where one along this tape failed.
+    /// Returns true if a method that needs no power series may do better after one along this tape failed.
     ///
     /// The laws whose series are written out have no poles: where these overflow, steps of any method are too
     /// short for the run ever to end.

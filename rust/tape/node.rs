@@ -79,7 +79,7 @@ pub enum Node {
 }
 
 impl Node {
-    /// Whether it comes so near to a constant that the terms of its series vanish.
+    /// Returns true if it comes so near to a constant that the terms of its series vanish.
     pub(super) fn levels_off(self) -> bool {
         matches!(self, Node::Exp(_) | Node::Tanh(_))
     }

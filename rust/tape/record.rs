@@ -181,7 +181,7 @@ impl<'a> Lowering<'a> {
         to
     }
 
-    /// Where the series of a symbol is stored.
+    /// The slot of the series of a symbol.
     fn slot(&mut self, s: Symbol) -> u16 {
         if let Some(&slot) = self.slot_of.get(&s) {
             return slot;
@@ -230,7 +230,7 @@ impl<'a> Lowering<'a> {
         self.push(node)
     }
 
-    /// Where the sine's series is stored, and that of the cosine after it.
+    /// The slot of the sine's series; that of the cosine is behind it.
     fn circle(&mut self, angle: Symbol) -> u16 {
         if let Some(&slot) = self.circle_of.get(&angle) {
             return slot;

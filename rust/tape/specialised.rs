@@ -2,7 +2,7 @@
 
 use super::{Node, Step, Tape};
 
-/// Whether a tape is one of the known ones, and where it holds what that one holds.
+/// The predefined tape that a tape equals, if any, and the places of the values that it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Specialised {
     Not,

@@ -33,7 +33,7 @@ pub(super) enum Made {
     Neg(Symbol),
     Add(Symbol, Symbol),
     Sub(Symbol, Symbol),
-    /// Where only one factor varies along a solution it is the first.
+    /// If only one factor varies along a solution, it is the first.
     Mul(Symbol, Symbol),
     Div(Symbol, Symbol),
     Apply(Function, Symbol),
@@ -105,7 +105,7 @@ impl<R: Real> Work for Apply<R> {
 #[derive(Debug, Default)]
 pub(super) struct Recording {
     pub(super) made: Vec<Made>,
-    /// Whether it changes along a solution.
+    /// True if it changes along a solution.
     pub(super) varies: Vec<bool>,
     /// Its place in the order of operands, independent of earlier symbols.
     ranks: Vec<Rank>,

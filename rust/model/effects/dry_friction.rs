@@ -96,7 +96,7 @@ impl<S: Scalar> Contributions<S> {
 
 impl<S: Scalar> Dry<S> {
     /// The bristles' torque on a body of this inertia, and the rate of their deflection; see
-    /// [`WithLuGre`](crate::model::WithLuGre). The damping lets the body come to rest on them with little
+    /// [`WithLuGre`](crate::model::WithLuGre). The damping lets the body stop on them with little
     /// swinging.
     #[inline(always)]
     pub fn bristles(&self, omega: S, deflection: S, inertia: S, sides: &Sides<S>) -> (S, S) {

@@ -10,7 +10,7 @@ use super::{Body, Contributions, EffectInputs, EffectLaw, EffectParameter, Scala
 /// F/g - 1   = -(Z Omega^2 + Y dOmega/dT)/g,      I dOmega/dT = g Y - k Omega - W Z Omega
 /// ```
 ///
-/// with the plain model's `dOmega/dT`: what the effect itself adds to the load is of second order in `a`. Where
+/// with the plain model's `dOmega/dT`: what the effect itself adds to the load is of second order in `a`. If
 /// the disk hangs below the contact and swings, `F > g`. At rest and in steady rotation (`Z = 0`, `Omega` constant)
 /// the load is the weight, and nothing changes there.
 pub struct LoadFriction;

@@ -78,7 +78,7 @@ impl<S: Scalar> EffectInputs<S> {
     }
 }
 
-/// Where effects enter the equations, summed over the effects.
+/// The parts of the equations that effects enter, summed over the effects.
 #[derive(Clone, Copy, Debug)]
 pub struct Contributions<S> {
     /// Torque per unit mass, m^2/s^2.
@@ -245,7 +245,7 @@ pub struct Spec {
 /// A physical effect: its description and its law.
 pub trait EffectLaw {
     const SPEC: Spec;
-    /// Whether it is dry friction, which can be [treated](FrictionModel) in several ways.
+    /// True if it is dry friction, which can be [treated](FrictionModel) in several ways.
     const DRY: bool = false;
 
     /// Adds the effect, with parameters `p` in the order of the spec, to its slots.
@@ -281,7 +281,7 @@ macro_rules! library {
                 match self { $(Kind::$Name => &$Name::SPEC),+ }
             }
 
-            /// Whether it is dry friction, which can be [treated](FrictionModel) in several ways.
+            /// Returns true if it is dry friction, which can be [treated](FrictionModel) in several ways.
             pub fn dry(self) -> bool {
                 match self { $(Kind::$Name => $Name::DRY),+ }
             }

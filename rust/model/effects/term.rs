@@ -8,7 +8,7 @@ use super::{
 use crate::model::{Parameter, parameter};
 use crate::scalar::{Scalar, vector};
 
-/// Where an effect's law comes from.
+/// The source of an effect's law.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     Library(Kind),
@@ -166,12 +166,12 @@ impl<S: Scalar> Term<S> {
         }
     }
 
-    /// Whether it holds a body at rest.
+    /// Returns true if it holds a body at rest.
     pub fn sticks(&self) -> bool {
         matches!(self.treatment, FrictionModel::SetValued | FrictionModel::Karnopp)
     }
 
-    /// Whether it takes slow sliding for rest.
+    /// Returns true if it treats slow sliding as rest.
     pub fn has_band(&self) -> bool {
         self.treatment == FrictionModel::Karnopp
     }
