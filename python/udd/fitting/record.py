@@ -39,7 +39,7 @@ _ODD = 9.0
 _FEWEST = 10  # Frames of a fit.
 _FEWEST_OF_SEVERAL = 4  # The same of each of several records. Start states use up fewer.
 _SHORT = 30  # A record with fewer frames hardly shows its noise.
-_END, _JUMP = 8, 20.0  # Frames at an end of a run, and the steps between them that no motion jumps there.
+_END, _JUMP = 8, 30.0  # Frames at an end of a run; no motion jumps there by so many of their steps.
 _LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
 _OF_FRAMES = ("t", "seen", "sigma", "rho", "states", "odd", "row", "film")  # arrays with a row for each frame
 _CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
@@ -377,13 +377,18 @@ def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray
 
 
 def _odd_ends(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Detect the first and the last two frames of a run that lie far beyond the steps of the next frames."""
+    """Detect a first or second frame of a run, or a last, that lies far beyond the steps of the next frames.
+
+    A fast transient is no outlier: each of its steps is a share of the step before.
+    """
     odd = np.zeros(len(guess), dtype=bool)
     for run in np.split(np.arange(len(guess)), np.flatnonzero(~linked) + 1):
         for frames in (run, run[::-1]) if len(run) >= 2 * _END else ():
-            near = guess[frames[2:_END]]
-            limit = _JUMP * np.maximum(np.abs(np.diff(near, axis=0)).max(axis=0), sigma)
-            odd[frames[:2]] |= (np.abs(guess[frames[:2]] - near[0]) > limit).any(axis=1)
+            x = guess[frames[:_END]]
+            steps = np.maximum(np.abs(np.diff(x, axis=0)), sigma)
+            across = np.maximum(np.abs(x[2] - x[0]), steps[2:].max(axis=0))
+            odd[frames[0]] |= (steps[0] > _JUMP * steps[1:].max(axis=0)).any()
+            odd[frames[1]] |= (np.minimum(steps[0], steps[1]) > _JUMP * across).any()
     return odd
 
 
