@@ -19,6 +19,7 @@ from udd.errors import UddError
 from udd.film import Defects
 from udd.measurement import read_measurement
 from udd.tracking import pictures_at, pixels
+from udd.tracking.correction import Correction
 from udd.tracking.detection.camera_motion import Background, CameraMotion
 from udd.video.reader import Picture, light_of_codes
 
@@ -144,6 +145,15 @@ def test_a_resting_camera_has_its_mean_view() -> None:
     sway = 2.0 * np.sin(np.arange(n) / 4) + 0j
     hand = CameraMotion(np.ones(n, complex), sway, np.ones(n), sigma, middle)
     assert np.allclose(hand.rested().shift, sway, atol=1e-12)
+
+
+def test_unknown_first_views_are_those_of_the_first_known() -> None:
+    shift = np.array([np.nan, np.nan, 3, np.nan, 5]) + 0j
+    gain, sigma = np.array([np.nan, np.nan, 0.6, 0.6, np.nan]), np.full((5, 3), 1e-3)
+    motion = CameraMotion(np.ones(5, complex), shift, gain, sigma, 100 + 80j)
+    correction = motion.correction(Correction())
+    assert correction.shift.tolist() == [3, 3, 3, 3, 5]
+    assert correction.gain.tolist() == [0.6] * 5  # a resting camera may have a view without its light
 
 
 def test_a_picture_without_points_shows_no_motion() -> None:

@@ -169,11 +169,11 @@ class CameraMotion:
         return {"camera_moved_px": round(self.rms, 4), "camera_sigma_px": round(place, 4)}
 
     def correction(self, before: Correction) -> Correction:
-        """Return what steadies the pictures; frames without a known view keep the last one."""
-        last = np.maximum.accumulate(np.where(self.is_measured, np.arange(len(self.shift)), 0))
+        """Return what steadies the pictures; a frame without a known view has that of the last known one."""
+        last, lit = _last_known(self.is_measured), _last_known(np.isfinite(self.gain))
         none, full = np.empty(0, np.complex128), before.full_range
         factor, shift = (none, none) if self.steady else (self.factor[last], self.shift[last])
-        gain = np.empty(0) if self.as_bright else self.gain[last]
+        gain = np.empty(0) if self.as_bright else self.gain[lit]
         return Correction(before.turns, before.mirrored, factor, shift, gain, full)
 
     def errors(self, at: NDArray[np.complex128]) -> list[Array]:
@@ -193,6 +193,12 @@ class CameraMotion:
             np.column_stack([-arm.imag * turn, arm.real * turn, turn]),
             np.column_stack([arm.real * turn, arm.imag * turn, 0 * turn]),
         ]
+
+
+def _last_known(known: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return for each frame the last known one, or the first one before that."""
+    last = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+    return np.asarray(np.maximum(last, int(np.argmax(known))))
 
 
 def _about_median(motion: CameraMotion) -> CameraMotion:
