@@ -1,9 +1,27 @@
 //! Codes that are made when they pay.
 
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::scalar::{Isa, LANES, Real, Scalar};
+
+/// The programs whose codes are kept for equal ones.
+const RECENT: usize = 16;
+
+/// A copy of an equal program among the latest ones, which shares its codes, or the program itself. A call with the same
+/// equations has the code of an earlier call, whatever the parameters are.
+pub fn shared<P: Clone + PartialEq>(latest: &Mutex<Vec<P>>, program: P) -> P {
+    let mut programs = latest.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(i) = programs.iter().position(|other| *other == program) {
+        programs[i..].rotate_left(1);
+        return programs[programs.len() - 1].clone();
+    }
+    if programs.len() == RECENT {
+        programs.remove(0);
+    }
+    programs.push(program.clone());
+    program
+}
 
 /// When code is made. Results have the same bits in any case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,6 +15,6 @@ mod memory;
 #[path = "no_memory.rs"]
 mod memory;
 
-pub use codes::{Codes, When, make_code};
+pub use codes::{Codes, When, make_code, shared};
 pub use listing::{Array, Listing, Operand, Operation, Place, Register};
 pub use memory::Code;

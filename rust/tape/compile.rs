@@ -538,6 +538,26 @@ mod tests {
         Some([interpreted, work].map(|work| work[..3].as_flattened().iter().flat_map(lanes).collect()))
     }
 
+    /// The second recording of the same equations has the code of the first one, though the parameters have other names.
+    #[test]
+    fn equal_equations_share_their_code() {
+        let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        let record = |texts: [&str; 2], parameter: &str| {
+            let family =
+                FormulaFamily::<2>::parse(&names(&["x", "y"]), &texts, &names(&[parameter]), &[]).unwrap();
+            Tape::record(&family, &[]).unwrap()
+        };
+        let has_code = |tape: &Tape<2>| tape.program.codes.get::<f64>(1, u32::MAX, |_| None).is_some();
+        let first = record(["y", "-x - c*y^3"], "c");
+        let made = first
+            .program
+            .codes
+            .get::<f64>(1, 0, |lanes| series(&first.program, Isa::best(), lanes, ROOM, HIGH));
+        let made = made.is_some();
+        assert_eq!(has_code(&record(["y", "-x - k*y^3"], "k")), made);
+        assert!(!has_code(&record(["y", "-x - k*y^2"], "k")));
+    }
+
     /// Machine code has the interpreter's bits, for every operation, order and instruction set.
     #[test]
     fn machine_code_changes_no_bit() {

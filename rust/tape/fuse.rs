@@ -4,11 +4,13 @@
 //! that only one linear step uses is passed on in a register: `x y - b z` is one operation instead of three. Nothing is
 //! reordered or rounded otherwise, so no bit changes.
 
+use std::sync::Mutex;
+
 use super::compile::{self, Start};
 use super::group::Plan;
 use super::node::{INVERSE, Node, Step};
 use super::series::{inner_at, inner_square_at};
-use crate::machine::{Code, Codes};
+use crate::machine::{self, Code, Codes};
 use crate::model::Sides;
 use crate::scalar::{InstructionSet, Isa, Scalar};
 
@@ -72,6 +74,8 @@ pub(super) struct Stretch {
     pub(super) chains: Vec<Chain>,
     pub(super) last: Option<Step>,
 }
+
+static LATEST: Mutex<Vec<Program>> = Mutex::new(Vec::new());
 
 /// The operations of a tape for each order.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -217,7 +221,7 @@ impl Program {
         let copied = (0..).zip(rates).filter(|&(n, _)| !delivered[usize::from(n)]);
         let copied = copied.map(|(n, &slot)| (slot, n)).collect();
         let program = Self { stretches, copied, slots, ..Self::default() };
-        Self { plan: Plan::of(&program), ..program }
+        machine::shared(&LATEST, Self { plan: Plan::of(&program), ..program })
     }
 }
 
