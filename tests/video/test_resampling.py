@@ -48,7 +48,7 @@ def test_whole_pixels_change_nothing_else() -> None:
 
 
 def test_a_large_picture_is_resampled_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    picture = np.random.default_rng(1).integers(0, 256, (90, 130, 3)).astype(np.uint8)
+    picture = np.random.default_rng(1).integers(0, 256, (90, 130, 3)).astype(np.float32)
     view = np.array([[1.01, -0.03, 4.3], [0.03, 1.01, -2.7]])
     whole = resampled(picture, view)
     monkeypatch.setattr(resampling, "PART", 130 * 11)
@@ -56,3 +56,5 @@ def test_a_large_picture_is_resampled_in_parts(monkeypatch: pytest.MonkeyPatch) 
     part = resampled(picture, view + np.column_stack([np.zeros((2, 2)), view[:, :2] @ [40, 20]]), (30, 25))
     assert np.abs(part - whole[20:45, 40:70]).max() < 0.05
     assert resampled(picture, view, (0, 5)).shape == (5, 0, 3)
+    codes = resampled(picture.astype(np.uint8), view)
+    assert codes.dtype == np.uint8 and (codes == np.clip(np.rint(resampled(picture, view)), 0, 255)).all()

@@ -121,8 +121,7 @@ def _steadied(planes: list[Plane], factor: complex, shift: complex, box: Box | N
         at += factor * complex(c0, r0)
         view = np.array([[factor.real, -factor.imag, at.real], [factor.imag, factor.real, at.imag]])
         moved = np.empty_like(plane) if box is None else plane.copy()
-        part = resampled(plane, view, (c1 - c0, r1 - r0))
-        moved[r0:r1, c0:c1] = np.clip(np.rint(part), 0, 255).astype(np.uint8)
+        moved[r0:r1, c0:c1] = resampled(plane, view, (c1 - c0, r1 - r0))
         out.append(moved)
     return out
 

@@ -13,7 +13,7 @@ PART = 1 << 17  # pixels that are resampled at once: the processor's cache holds
 
 def resampled(
     picture: NDArray[Any], view: NDArray[np.float64], size: tuple[int, int] | None = None
-) -> NDArray[np.float32]:
+) -> NDArray[Any]:
     """Resample a picture with an affine map.
 
     OpenCV's cubic kernel displaces edges by up to 0.05 pixels, and its tables round places to 1/32 of a
@@ -31,18 +31,24 @@ def resampled(
 
     Returns
     -------
-    ndarray of float32
-        Outside the picture the value of the nearest edge.
+    ndarray of uint8 or float32
+        Codes of 8 bits if the picture has such. Outside the picture the value of the nearest edge.
     """
+    import cv2
+
     width, height = picture.shape[1::-1] if size is None else size
-    out = np.empty((height, width, *picture.shape[2:]), np.float32)
+    kind = np.uint8 if picture.dtype == np.uint8 else np.float32
+    out = np.empty((height, width, *picture.shape[2:]), kind)
     if not out.size:
         return out
     rows = max(1, PART // width)
     for row in range(0, height, rows):
         here = view + np.column_stack([np.zeros((2, 2)), row * view[:, 1]])
         part = out[row : row + rows]
-        part[:] = _part(*_needed(picture, here, part.shape[1::-1]), part.shape[1::-1])
+        value = _part(*_needed(picture, here, part.shape[1::-1]), part.shape[1::-1])
+        if kind is np.uint8:
+            value = cv2.add(value, 0.0, dtype=cv2.CV_8U)  # type: ignore[call-overload]  # rounds and clips
+        part[:] = value
     return out
 
 

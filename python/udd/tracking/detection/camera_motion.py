@@ -409,7 +409,7 @@ def _seen_from(y: Plane, factor: complex, shift: complex) -> Plane:
     if factor == 1 and shift == 0:
         return y
     view = np.array([[factor.real, -factor.imag, shift.real], [factor.imag, factor.real, shift.imag]])
-    return np.clip(np.rint(resampled(y, view)), 0, 255).astype(np.uint8)
+    return resampled(y, view)
 
 
 def _similar(
