@@ -50,7 +50,7 @@ def as_taken(case: Case, film: Film) -> Film:
     t = film.t
     if "blended" in case.defects:
         rate = case.defects["blended"]
-        t = np.arange(int(t[-1] * rate + 1e-6) + 1) / rate
+        t = np.arange(math.ceil(t[-1] * rate - 1e-6) + 1) / rate  # the last one is mixed in, too
     elif "copied" in case.defects:
         t = np.unique(t)
     else:
