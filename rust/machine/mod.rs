@@ -12,8 +12,9 @@ mod listing;
 #[cfg(all(feature = "machine-code", target_arch = "x86_64"))]
 mod memory;
 #[cfg(not(all(feature = "machine-code", target_arch = "x86_64")))]
-#[path = "no_memory.rs"]
-mod memory;
+mod no_memory;
+#[cfg(not(all(feature = "machine-code", target_arch = "x86_64")))]
+use no_memory as memory;
 
 pub use codes::{Codes, When, make_code, shared};
 pub use listing::{Array, Listing, Operand, Operation, Place, Register};

@@ -783,7 +783,10 @@ def test_a_film_that_is_cut_off(film: Path, tmp_path: Path, capsys: pytest.Captu
     assert set(tmp_path.iterdir()) == {cut}
 
 
-def test_a_film_without_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_film_without_marks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     av = pytest.importorskip("av", reason="needs the extra 'track'")
     path = tmp_path / "wall.mp4"
     with av.open(str(path), "w") as container:
@@ -794,7 +797,11 @@ def test_a_film_without_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]
             picture[40:80, 30:60] = 20
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode(None))
-    assert "no disk with marks" in failed(["discover", path, "--W", "0.04"], capsys)
+    assert main(["discover", str(path), "--W", "0.04"]) == 1
+    out, err = capsys.readouterr()
+    page, error = err.splitlines()
+    assert out == "" and "wall-refused.html" in page and (tmp_path / "wall-refused.html").exists()
+    assert error.startswith("udd: error: ") and "no disk with marks" in error
 
 
 def test_the_demonstration_of_a_disk_that_lacks_nothing_takes_the_other_film(

@@ -242,7 +242,7 @@ def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
         found.report(tmp_path)
     with pytest.raises(UddError, match="cannot be read"):
         found.report(tmp_path / "page.html", source=tmp_path / "absent.csv")
-    with pytest.raises(UddError, match="not tracked in a film"):
+    with pytest.raises(UddError, match="cannot be read"):
         found.report(tmp_path / "page.html", film=tmp_path / "absent.mp4")
     assert list(tmp_path.iterdir()) == []
 

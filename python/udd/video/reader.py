@@ -189,11 +189,35 @@ class Film:
         return "; ".join(text for text in texts if text)
 
     def corrected(self, picture: Picture, box: Box | None = None) -> Picture:
-        """Return a picture as it is after the film's correction, at least inside a box."""
+        """Correct a picture for the camera, at least inside a box.
+
+        Parameters
+        ----------
+        picture : Picture
+            One of :meth:`uncorrected`.
+        box : Box, optional
+            The part that is needed; by default all of the picture.
+
+        Returns
+        -------
+        Picture
+            The same picture if the film has no correction.
+        """
         return picture if self.correct is None else self.correct(picture, box)
 
     def pictures(self, since: float = 0.0) -> Iterator[Picture]:
-        """Yield all frames that decode, corrected; see :meth:`uncorrected`."""
+        """Yield all frames that decode, corrected; see :meth:`uncorrected`.
+
+        Parameters
+        ----------
+        since : float
+            If above 0, begin with the last key frame up to this time [s].
+
+        Yields
+        ------
+        Picture
+            Brightness, colour differences and time of a frame.
+        """
         for picture in self.uncorrected(since):
             yield self.corrected(picture)
 

@@ -24,6 +24,7 @@ POINTS = 300  # of a picture that are tried
 CONTRAST = (0.005, 0.001)  # of the strongest point that the others have; the weaker ones if the first fail
 LARGE = 2e6  # pixels: larger pictures, as of 4K, are reduced by a whole factor
 LEARNED = 40  # pictures that show which of them belong to the background
+EXISTS = 0.3  # share of the pictures in which strong points show the background; without it there is none
 OFTEN = 0.35  # share of these in which such a point goes with the others
 FEWEST = 10  # points that must go the same way
 SHARE = 0.25  # of all that can be followed that must
@@ -232,10 +233,14 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     whole = [p for p in look_over.pictures if not unusable(p)]
     if not whole:
         return None
-    best, share = None, KNOWN
+    best, share, most = None, KNOWN, 0.0
     for contrast, part in product(CONTRAST, (0.0, 0.5, 1.0)):  # after a zoom another picture may show more
+        if contrast < CONTRAST[0] and most < EXISTS:
+            break  # weak points of the disk itself may go the same way
         background = Background(whole[round(part * (len(whole) - 1))].y, film.light, contrast)
         seen = background.follow(whole[::2]) if background.learned(whole) else None
+        if seen is not None:
+            most = max(most, float(seen.is_measured.mean()))
         if seen is not None and seen.is_measured.mean() >= share:
             best, share = (background, seen), float(seen.is_measured.mean())
         if share > ALL:
