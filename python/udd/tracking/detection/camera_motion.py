@@ -239,10 +239,12 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
             break  # weak points of the disk itself may go the same way
         background = Background(whole[round(part * (len(whole) - 1))].y, film.light, contrast)
         seen = background.follow(whole[::2]) if background.learned(whole) else None
-        if seen is not None:
-            most = max(most, float(seen.is_measured.mean()))
-        if seen is not None and seen.is_measured.mean() >= share:
-            best, share = (background, seen), float(seen.is_measured.mean())
+        if seen is None:
+            continue
+        shown = float(seen.is_measured.mean())
+        most = max(most, shown)
+        if shown >= share:
+            best, share = (background, seen), shown
         if share > ALL:
             break
     if best is None or (best[1].steady and best[1].as_bright):
