@@ -367,7 +367,6 @@ def _odd_blocks(
     width = length + 4
     if len(guess) < width or not (whole := sliding_window_view(linked, width - 1).all(axis=1)).any():
         return odd
-    has_odd: NDArray[np.bool_]
     odd, filled = odd.copy(), guess.copy()
     for _ in range(_CLEANED):
         for channel in filled.T if odd.any() else ():
@@ -377,7 +376,7 @@ def _odd_blocks(
         if length > 1:  # it begins and ends with a jump
             for bend in (seen[..., :3], seen[..., -3:]):
                 off = np.minimum(off, np.abs(np.diff(bend, 2)[..., 0]))
-        has_odd = sliding_window_view(odd, width)[:, 2:-2].any(axis=1)
+        has_odd = np.asarray(sliding_window_view(odd, width)[:, 2:-2].any(axis=1))
         typical = np.maximum(np.median(off[whole & ~has_odd], axis=0), sigma)
         # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
         # steps.
