@@ -20,7 +20,7 @@ from udd.discovery.nonparametric.penalized_curves import chance, smooth
 from udd.discovery.scoring.coordinates import coordinate, coordinates, slots
 from udd.discovery.scoring.forcing import Score, responses, score_forcings
 from udd.discovery.symbolic.expressions import evaluate, read, sensible, simplify, write
-from udd.discovery.symbolic.formulas import Formula, _Target, formulas_for
+from udd.discovery.symbolic.formulas import Formula, _Target, formulas_for, power_for
 from udd.errors import FitError, UddError
 from udd.fitting import fit_record, record_of, with_larger_model_error
 from udd.plot.curves import curve as draw
@@ -113,6 +113,19 @@ def test_the_form_of_a_wave_is_named():
     # Constants do not take the name of a state, as of a double pendulum's angles a and b.
     (only,) = formulas_for(curve, 4500, taken=["a", "b"]).formulas
     assert only.text == "c * sin(5 * beta)"
+
+
+def test_the_form_of_a_bump_of_an_angle_is_named():
+    law = lambda t, o, y, z, b: (0.05 * np.exp(2 * (np.cos(b - 1) - 1)), 0.0, 0.0)  # noqa: E731
+    fit = udd.fit(unmodelled.record(law, 1, 40.0), udd.Disk(W))
+    curve = scan_curves(fit).curves[0]
+    assert curve.name == ("torque", "beta")
+    only = formulas_for(curve, 4500).formulas[0]
+    assert only.text == "a * exp(b * cos(c + beta))"
+    assert only.parameters["b"] == pytest.approx(2, rel=0.2)
+    assert only.parameters["c"] == pytest.approx(-1, abs=0.1)
+    # No power of an angle has the same value after a turn.
+    assert power_for(curve, 4500) is None
 
 
 def test_a_law_of_two_coordinates_is_located():
@@ -261,6 +274,10 @@ def test_an_angle_that_does_not_go_round_has_ends():
     assert along(x, True, 12).periodic
     assert not along(0.02 * x, True, 12).periodic
     assert not along(x, False, 12).periodic
+    # A curve with a jump from pi to -pi is no law of an angle, wherever the places leave a gap.
+    turned = np.mod(x, 2 * np.pi) - np.pi
+    assert along(turned[abs(turned + 1) > 1], True, 12).periodic
+    assert not along(turned[abs(turned) < 2.5], True, 12).periodic
 
 
 def test_surfaces_are_products():
@@ -415,6 +432,9 @@ def test_laws_have_a_form():
     assert not sensible(read_one("2^(3*x)"))
     assert not sensible(read_one("2*exp(x)"))
     assert sensible(read_one("2*sin(x)"), angle=True)
+    assert sensible(read_one("2*exp(3*cos(x + 1))"), angle=True)
+    assert not sensible(read_one("2*exp(3*cos(x + 1))"))
+    assert not sensible(read_one("2*exp(3*cos(5*x))"), angle=True)
 
 
 def test_without_pyoperon_the_usual_forms_are_tried(monkeypatch):

@@ -84,14 +84,13 @@ class Spline:
 def along(x: Array, angle: bool, intervals: int) -> Spline:
     """Make the basis for the places that a record visits.
 
-    An angle is periodic if the places cover the whole turn.
+    An angle is periodic if the places cover the turn, or lie on both sides of the jump from pi to -pi.
     """
-    if angle:
-        turned = np.sort(np.mod(x, 2 * np.pi).ravel())
-        widest = np.diff(turned, append=turned[0] + 2 * np.pi).max()
-        if widest < 2 * np.pi / intervals:
-            return Spline(0.0, 2 * np.pi, intervals, True)
     low, high = float(x.min()), float(x.max())
+    if angle:
+        gap = np.diff(np.sort(x, axis=None)).max(initial=2 * np.pi / intervals)
+        if 2 * np.pi - (high - low) < gap:
+            return Spline(0.0, 2 * np.pi, intervals, True)
     margin = 0.02 * (high - low)
     return Spline(low - margin, high + margin, intervals, False)
 

@@ -148,12 +148,18 @@ def sensible(node: Node, angle: bool = False) -> bool:
     """Return True if a reader would accept the formula as a law.
 
     It has no nested functions, no variable in an exponent, and no dimensional variable alone in a function.
+    The sine and cosine of an angle are its coordinates, so functions may contain them.
     """
     curved = ("sin", "cos", "tanh", "exp", "ln")
+
+    def nested(inner: Node) -> bool:
+        coordinate = inner[0] in ("sin", "cos") and all(part[0] in "xc+-" for part in parts(inner[1]))
+        return inner[0] in curved and not (angle and coordinate)
+
     for part in parts(node):
         if part[0] == "^" and any(inner[0] == "x" for inner in parts(part[2])):
             return False
-        if part[0] in curved and any(inner[0] in curved for inner in parts(part[1])):
+        if part[0] in curved and any(nested(inner) for inner in parts(part[1])):
             return False
         if part[0] in curved and part[1] == X and not angle:
             return False

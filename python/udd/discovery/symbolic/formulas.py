@@ -33,7 +33,9 @@ from .formula_proposals import powers, regression, usual
 Array = NDArray[np.float64]
 
 _MOST = 12  # formulas that are shortened
-_FAR = 40.0  # nats below the curve, beyond which shortening cannot rescue a formula
+# Share of the curve's evidence that a formula must have: the score's linearisation may cost the rest.
+_SHARE = 0.95
+_FAR = 40.0  # nats below that share, beyond which shortening cannot rescue a formula
 _HUGE = 1e6
 _STEP = math.sqrt(np.finfo(float).eps)  # relative step of a constant in difference quotients
 # places of the curve at which formulas are fitted, and at which they are tested
@@ -124,9 +126,8 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
         fitted = target.fit(node, values) if target.takes(node) else None
         if fitted is not None:
             trials.append(fitted)
-    shortlist = [
-        candidate for candidate in _different(trials, target.x) if candidate.nats > curve.evidence - _FAR
-    ][:_MOST]
+    least = _SHARE * curve.evidence - _FAR
+    shortlist = [candidate for candidate in _different(trials, target.x) if candidate.nats > least][:_MOST]
     ranked = _different([target.shorten(candidate) for candidate in shortlist], target.x)
     free = [name for name in _NAMES if name not in taken]
     formulas = [_formula(curve, candidate, free) for candidate in ranked]
@@ -139,7 +140,7 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
 
 
 def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> Formula | None:
-    """Fit a power with a free exponent to a curve; None if no fit succeeds.
+    """Fit a power with a free exponent to a curve; None if no fit succeeds, or over a periodic angle.
 
     It is the rival of every law that grows with its coordinate.
 
@@ -148,6 +149,8 @@ def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> F
     curve, observations, taken
         As for :func:`formulas_for`.
     """
+    if curve.splines[0].periodic:
+        return None
     target = _Target(curve, observations)
     positive = curve.coordinates[0].name in _POSITIVE
     trials = []
