@@ -29,8 +29,7 @@ _FAST = 0.9  # quantile of the rates: one in fifty frames may be an outlier
 _STRETCHES = 20  # parts of a record that is mostly at rest, of which any may show the motion
 _WHOLE = 0.9  # share of the observed frames in which all columns must be present
 _BIAS = 0.3  # share of a mean's noise that the curvature of the motion within a block may contribute
-# share of a block's frames from which on its mean is corrected; below half of them there is no mean
-_FULL = 0.8
+_KEPT = 0.5  # share of a block's frames below which there is no mean
 _NEXT = 1.5  # steps within which a frame follows another
 _ORDER = 5  # of the differences that show a column's noise, in which motion is small
 _PARTS = 4  # parts of a block; their means show the noise
@@ -134,32 +133,37 @@ def _averaged(
     good = ~odd_frames(values, noise_by_differences(values, _ORDER), np.diff(t) < _NEXT * step)
     number = int(block[-1]) + 1
     count = np.bincount(block[good], minlength=number)
-    kept, full = count >= every / 2, count >= _FULL * every
+    kept = count >= _KEPT * every
     least = np.maximum(count, 1)
 
     def means(column: Array) -> Array:
         result: Array = np.bincount(block[good], column[good], minlength=number) / least
         return result
 
+    since = t - t[0] - (block + 0.5) * length  # the block's middle
+    spread = means(since**2) - means(since) ** 2
     times = means(t)
-    inside = np.flatnonzero(full[:-2] & full[1:-1] & full[2:]) + 1
+    inside = np.flatnonzero(kept[:-2] & kept[1:-1] & kept[2:]) + 1
+    before, after = times[inside] - times[inside - 1], times[inside + 1] - times[inside]
     columns, sigmas = [], []
     for k, x in enumerate(values.T):
         noise = _part_noise(part[good], x[good]) / np.sqrt(_PARTS)
         noise = max(noise, 1e-6 * float(np.ptp(x)))
         mean = means(x)
-        bend = np.zeros(number)
-        bend[inside] = mean[inside - 1] - 2 * mean[inside] + mean[inside + 1]
-        # A block mean is off by 1/24 of the second difference, plus a small share of the fourth.
+        curvature = np.zeros(number)
+        slopes = (mean[inside + 1] - mean[inside]) / after, (mean[inside] - mean[inside - 1]) / before
+        curvature[inside] = 2 * (slopes[0] - slopes[1]) / (before + after)
+        # A block mean is off by half the curvature times the spread of its times, plus a small share of the
+        # fourth difference.
         bends = inside[np.isin(inside - 1, inside) & np.isin(inside + 1, inside)]
-        fourth = bend[bends - 1] - 2 * bend[bends] + bend[bends + 1]
+        fourth = length**2 * (curvature[bends - 1] - 2 * curvature[bends] + curvature[bends + 1])
         excess = float(np.mean(fourth**2)) - 70 * noise**2 if len(bends) else 0.0
         if 0.0047 * np.sqrt(max(excess, 0.0)) > _BIAS * noise:
             return None
         # A block next to a gap has no second difference, so its mean is not corrected, and it is dropped.
-        columns.append(mean - bend / 24)
+        columns.append(mean - curvature * spread / 2)
         if measurement.sigma is None:
-            sigmas.append(np.full(number, noise))
+            sigmas.append(noise * np.sqrt(every / least))
         else:
             stated = means(measurement.sigma[whole, k] ** 2)
             sigmas.append(np.maximum(np.sqrt(stated / least), noise))
