@@ -29,6 +29,7 @@ GOES_ON = 0.25  # of the usual change over three frames, that there is across a 
 CONTRAST = 0.15  # of the usual misfit that a relation between frames leaves in its phase
 CLEARLY = 0.3  # of the usual misfit, that it leaves in most cycles
 VOTES = 0.75  # share of the cycles
+MOVES = 0.05  # of the misfit of fast cycles: in a slower one nothing moves, and copies are no evidence
 STEADY = 0.999  # share of a frame of the camera that the film's frames determine
 NOISY = 5.0  # factor by which a separated frame may have more noise
 NEGLIGIBLE = 0.01  # share of a frame
@@ -192,7 +193,7 @@ def _recognised(kind: Conversion, band: Array) -> tuple[float, Conversion] | Non
         for b in range(size):
             misfit += product[a, b] * band[abs(a - b), min(a, b) : min(a, b) + count]
     table = misfit[: cycles * cycle].reshape(cycles, cycle)
-    table = table[table.max(axis=1) > 0.2 * np.median(table.max(axis=1))]
+    table = table[table.max(axis=1) > MOVES * np.quantile(table.max(axis=1), 0.9)]
     level = np.median(table, axis=0) if len(table) >= FEWEST_CYCLES else np.ones(cycle)
     phase = int(np.argmin(level))
     contrast = float(level[phase] / max(np.median(np.delete(level, phase)), 1e-9))
