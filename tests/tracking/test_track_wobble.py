@@ -15,6 +15,7 @@ pytest.importorskip("cv2", reason="the tracker's extra is not installed")
 import udd
 from udd.film import Defects
 from udd.tracking import track_disk
+from udd.tracking.geometry.lens import calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Mark
 from udd.tracking.passes.tracks import Tracks, lost_in
 from udd.tracking.passes.wobble import wobble
@@ -79,3 +80,16 @@ def test_a_film_without_says_none(tmp_path: Path) -> None:
     m = filmed(tmp_path / "flat.mp4", 0)
     assert m.meta["wobble"] == 0
     assert m.meta["calibration"]["wobble"][2].startswith("none seen (less than ")
+
+
+def test_the_wobble_of_a_disk_that_hardly_moves_is_no_lens() -> None:
+    """A lens with the curvature -0.45 was fitted, and made the scale 5 % wrong."""
+    rng = np.random.default_rng(3)
+    t = 0.04 * np.arange(17)
+    place = 240 + 270j + 12 * np.sin(2 * np.pi * t / 1.3) * (1 + 0.2j)
+    angle = 2.6 + 0.1 * np.sin(2 * np.pi * t / 1.3)
+    short = np.cos(0.1 * np.sin(2 * np.pi * t / 1.3 + 0.4))
+    arms = 110 * np.array([-1j, 1, 1j, -1]) * np.exp(1j * angle)[:, None]
+    seen = place[:, None] + short[:, None] * arms.real + 1j * arms.imag
+    seen += 0.02 * (rng.normal(size=seen.shape) + 1j * rng.normal(size=seen.shape))
+    assert abs(calibrate(seen, (700, 550)).lens.curve) < 0.01

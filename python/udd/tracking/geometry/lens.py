@@ -12,6 +12,7 @@ Complexes = NDArray[np.complex128]
 PRIOR = np.array([0.1, 0.15, 0.15, 0.1, 0.05])  # what cameras on a tripod have
 BETTER = 0.8  # the misfit must fall to this share, or the picture is taken as it is
 FEWEST = 12  # frames to judge by
+DETERMINED = 0.5  # of `PRIOR`: what the film determines worse is left at 0
 
 
 @dataclass(frozen=True)
@@ -147,6 +148,10 @@ def calibrate(
     # the loss is about rms^2 / 2 per spare coordinate; the weak priors are in the Jacobian
     spread = np.linalg.pinv(bent.jac.T @ bent.jac, hermitian=True)[:5, :5] * (2 * bent.cost / spare)
     sigma = np.where(free, np.sqrt(np.diag(spread)), 0.0)
+    # a disk that hardly moves does not show the lens; what it shows, as a wobble, would become one
+    if (sigma > DETERMINED * PRIOR).any():
+        free = free & (sigma <= DETERMINED * PRIOR)
+        bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
     if bent.cost > BETTER**2 * flat.cost:
         return Bent(as_given, sigma, False)
     return Bent(Lens(middle, size, *(float(v) for v in np.where(free, bent.x[:5], fixed))), sigma, True)
