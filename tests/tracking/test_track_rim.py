@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from udd.tracking.calibration.rim import turning_circle
+from udd.tracking.calibration.rim import outline, turning_circle
+from udd.tracking.geometry.pose import DiskAppearance, Mark, Motion, Pose
+from udd.video.reader import Picture, TrackError, light_of_codes
 
 CENTRE, RADIUS = 0.8 - 0.5j, 140.0
 
@@ -45,3 +47,18 @@ def test_a_disk_that_does_not_turn_has_its_centre_where_its_rim_seems_to_be() ->
     found = turning_circle(*rim(np.random.default_rng(2), 0.0, 0.2 + 0.1j))
     assert abs(found.centre - CENTRE) < 3 * found.centre_sigma
     assert found.centre_sigma > 0.15  # as well as is known how far rims seem to be shifted
+
+
+def test_edges_on_few_rays_are_no_rim() -> None:
+    """Edges of books about a disk that is as bright as the wall made the scale 5 % wrong."""
+    middle, reach = 150 + 150j, 80.0
+    column, row = np.meshgrid(np.arange(300), np.arange(300))
+    arm = column + 1j * row - middle
+    codes = np.full((300, 300), 200, np.uint8)
+    codes[(np.abs(arm) > 1.3 * reach) & (np.abs(np.angle(arm)) < np.radians(4.5))] = 60
+    picture = Picture(0, 0.0, codes, codes[::2, ::2], codes[::2, ::2])
+    marks = [Mark(reach * 1j**k, (5.0, 5.0), 0.0, -60.0) for k in range(4)]
+    look = DiskAppearance(marks, 0.8, 2.0, light_of_codes(False), 1.1 * reach)
+    frames = [(picture, Pose(middle, 0.0), Motion())] * 20
+    with pytest.raises(TrackError, match="rim does not stand out"):
+        outline(frames, look, np.ones((300, 300), dtype=bool))

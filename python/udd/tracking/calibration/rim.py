@@ -15,6 +15,8 @@ RAYS = 180
 SPAN = (1.08, 1.55)  # of the marks' reach: where the rim may lie
 SHIFT = 0.2  # pixels by which light or lens may shift a rim in the picture
 ROUNDS = 20
+FEWEST = 60  # points of a rim
+SEEN = 0.03  # share of the rays on which a rim must show: fewer may be the edges of other things
 LEAST = 0.01  # pixels: the radius is known no better
 CLEAR, SHARE = (
     25.0,
@@ -63,7 +65,7 @@ def outline(
         turns.append(np.exp(1j * turn))
         group.append(np.full(int(ok.sum()), number))
     z = np.concatenate(points) if points else np.empty(0, dtype=complex)
-    if len(z) < 60:
+    if len(z) < max(FEWEST, SEEN * RAYS * len(frames)):
         raise TrackError("the disk's rim does not stand out from the background, so it gives no scale")
     return turning_circle(z, np.concatenate(turns), np.concatenate(group))
 
