@@ -69,6 +69,29 @@ def test_a_picture_of_the_device_is_not_tracked(size: float, tmp_path: Path) -> 
     assert e[0] < 0.05 and e[1] < 0.05 and e[2] < 1 and m.seen.all()
 
 
+def bookshelf(width: int, height: int) -> np.ndarray:
+    """Books in all colours, most of them larger than a mark, with pale labels."""
+    random = np.random.default_rng(5)
+    wall = np.full((height, width, 3), 70.0)
+    for top in range(0, height, 60):
+        left = 0
+        while left < width:
+            wide = int(random.integers(8, 18))
+            wall[top + 4 : top + 59, left : left + wide] = random.integers(30, 235, 3)
+            wall[top + 20 : top + 30, left + 2 : left + wide - 2] = random.integers(180, 250, 3)
+            left += wide
+    return wall
+
+
+def test_books_in_the_colours_of_the_marks_are_not_marks(tmp_path: Path) -> None:
+    """The fourteen largest patches of each colour were books, so that the film was refused."""
+    film = shot(tmp_path / "books.mp4", background=bookshelf(*SMALL), defects=Defects(shake=2.0))
+    with pytest.warns(UserWarning, match="the camera moved"):
+        m = udd.track(film.path)
+    e = rms(errors(m, film))
+    assert m.seen.mean() > 0.97 and e[0] < 0.1 and e[1] < 0.1 and e[2] < 2
+
+
 def test_a_mirrored_film_is_turned_around(tmp_path: Path) -> None:
     film = shot(tmp_path / "selfie.mp4", defects=Defects(mirrored=True))
     with pytest.warns(UserWarning, match="mirrored"):

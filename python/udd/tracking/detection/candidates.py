@@ -49,9 +49,10 @@ def classify(
     size = np.take_along_axis(along, best[None], 0)[0]
     # a streak is a pale version of its mark: same hue, down to a fifth of the strength
     strong = (size > np.maximum(0.2 * strength[best], 9.0)) & (size > 0.9 * np.hypot(u, v)) & open_
+    pale = np.hypot(u, v) < max(0.2 * float(strength.min()), 9.0)
     out = []
     for alike in (unit @ unit.T > SAME) | np.eye(len(unit), dtype=bool):
-        b = blobs(strong & alike[best], least=4, most=8)
+        b = blobs(strong & alike[best], least=4, most=8, pale=pale)
         out.append(Blobs(b.centre + 2 * (c0 + 1j * r0), b.area))
     return out
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ HUES = {"red": (80.0, 122.0), "orange": (122.0, 165.0), "blue": (-70.0, 15.0), "
 LEAST_CHROMA = 18.0  # of 127: below, grey with noise
 FADED = 8.0  # the same where no strong colours are found
 FEWEST = 3  # frames that must show the disk
+WIDTH = 2  # half-resolution pixels: the margin of a patch that is looked at
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,13 @@ def _names(least: float) -> NDArray[np.uint8]:
     return names
 
 
-def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
-    """Connected patches of a half-resolution mask, the largest first."""
+def blobs(
+    mask: NDArray[np.bool_], least: int, most: int = 14, pale: NDArray[np.bool_] | None = None
+) -> Blobs:
+    """Connected patches of a half-resolution mask, the largest first, and at most so many.
+
+    If there are more, those that `pale` pixels surround come first, as a disk surrounds its marks.
+    """
     import cv2
 
     codes = mask.astype(np.uint8)
@@ -66,18 +73,40 @@ def blobs(mask: NDArray[np.bool_], least: int, most: int = 14) -> Blobs:
     part = codes[row : row + height, column : column + width]
     count, _, stats, centre = cv2.connectedComponentsWithStats(part, connectivity=8)
     area = stats[1:count, cv2.CC_STAT_AREA]
-    order = np.argsort(-area, kind="stable")[:most]
+    order = np.argsort(-area, kind="stable")
     order = order[area[order] >= least]
+    if pale is not None and len(order) > most:
+        margin = _pale_margin(stats[1:count][order], pale[row : row + height, column : column + width])
+        order = order[np.argsort(-np.round(margin, 1), kind="stable")]
+    order = order[:most]
     xy = centre[1:count][order] + [column, row]
     # a half-resolution sample i covers the full pixels 2i and 2i + 1, whose middle is 2i + 1/2
     return Blobs(np.asarray(2 * (xy[:, 0] + 1j * xy[:, 1]) + (0.5 + 0.5j)), np.asarray(4.0 * area[order]))
+
+
+def _pale_margin(boxes: NDArray[Any], pale: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the share of pale pixels in the margin of each box (left, top, width, height, area)."""
+    import cv2
+
+    sums = cv2.integral(pale.astype(np.uint8))
+    left, top, right, bottom = boxes[:, 0], boxes[:, 1], boxes[:, 0] + boxes[:, 2], boxes[:, 1] + boxes[:, 3]
+
+    def inside(by: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        x0, x1 = (np.clip(x, 0, pale.shape[1]) for x in (left - by, right + by))
+        y0, y1 = (np.clip(y, 0, pale.shape[0]) for y in (top - by, bottom + by))
+        counts = sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
+        return counts.astype(float), ((x1 - x0) * (y1 - y0)).astype(float)
+
+    (outer, whole), (inner, part) = inside(WIDTH), inside(0)
+    return np.asarray((outer - inner) / np.maximum(whole - part, 1))
 
 
 def coloured(picture: Picture, chroma: float = LEAST_CHROMA) -> list[Blobs]:
     """Blobs of each of the four colours, by broad hues, stronger than `chroma`."""
     name = _names(chroma).ravel()[(picture.u.astype(np.uint16) << 8) | picture.v]
     least = max(6, picture.u.size // 20000)
-    return [blobs(name == k + 1, least) for k in range(len(COLOURS))]
+    pale = name == 0
+    return [blobs(name == k + 1, least, pale=pale) for k in range(len(COLOURS))]
 
 
 def squares(
