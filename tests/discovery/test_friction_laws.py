@@ -43,6 +43,16 @@ LAWS = [
     E.warming_friction(a=0.001, tau=30.0),
     E.warming_friction(a=-0.001, tau=15.0),
     E.load_coulomb(f=0.0004),
+    E.formula(
+        "torque",
+        "-a*exp(-((beta - 0.1)/0.15)^2)*tanh(Omega/0.01)",
+        name="dry_brake",
+        amplitudes=["a"],
+        a=0.001,
+    ),
+    E.formula("torque", "-a*tanh(Omega/0.8)", name="saturating", a=0.002),
+    E.formula("torque", "-a*abs(Omega)", name="one_way", a=0.001),
+    E.formula("torque", "-a*Omega^2", name="one_way_drag", a=0.001),
 ]
 
 
@@ -100,13 +110,15 @@ def test_scanned_values_score_as_their_full_derivatives_do():
     result = scores(E.local_brake(a=0.005, c=0.15, s=0.08))
     strongest, number = strongest_shapes(result.fit)
     listed = {s.candidate: s for s in result.library.scored}
-    assert len(strongest) == 5
     assert {s.candidate.effect.name for s in strongest} == {
         "local_brake",
         "power_drag",
         "threshold_drag",
         "warming_friction",
+        "dry_brake",
+        "saturating",
     }
+    assert len(strongest) == 7  # two places of one brake
     assert number > 40
     for item in strongest:
         # Within a frame the motion is followed at a few places.
@@ -168,3 +180,17 @@ def test_a_cart_s_places_are_within_its_way():
     assert best.candidate.title == "friction near a place of x in force(x)"
     assert abs(best.candidate.effect.parameters["b"] - 0.3) < 0.15
     assert not [s for s in strongest if not -1.1 < s.candidate.effect.parameters.get("b", 0.0) < 2.5]
+
+
+@pytest.mark.parametrize(
+    ("law", "name"),
+    [
+        (E.formula("torque", "-0.008*tanh(Omega/0.5)", name="bounded"), "saturating"),
+        (E.formula("torque", "-0.0054*abs(Omega)*Omega - 0.002*Omega^2", name="rough"), "one_way_drag"),
+    ],
+)
+def test_a_law_of_the_speed_is_no_brake_near_an_angle_and_no_constant_torque(law, name):
+    plain = udd.Pendulum(0.5, k0=0.01)
+    found = udd.discover(seen(plain.with_effects([law]), noise=2e-3), plain, progress=False)
+    assert name in [one.effect.name for one in found.effects]
+    assert not {"local_brake", "constant_torque"} & {one.effect.name for one in found.effects}

@@ -299,6 +299,10 @@ _NAMED = {
     "stribeck": Truth(*_SPEED, "stribeck"),
     "load_coulomb": Truth("friction", "load", "load"),
     "warming_friction": Truth("friction", "t", "decay"),
+    "dry_brake": Truth("friction", "theta", "dry bump"),
+    "saturating": Truth(*_SPEED, "saturating"),
+    "one_way": Truth("friction", "Omega", "one way"),
+    "one_way_drag": Truth("friction", "Omega", "one way"),
 }
 
 

@@ -49,6 +49,8 @@ def library(
         turning += [] if states is None else load_frictions(model, states)
         listed = [c for c in (*given, *terms(model), *delays(model), *turning) if c.effect.name not in there]
         return list({(c.effect.name, c.effect.values): c for c in listed}.values())
+    from .friction_terms import one_way
+
     result = []
     for spec in effects.library():
         if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:
@@ -64,7 +66,8 @@ def library(
                 notes += [f"{p.name} = {chosen[p.name]:g}" for p in shapes if len(p.grid) > 1]
                 title = spec.title + (f" ({', '.join(notes)})" if notes else "")
                 result.append(Candidate(effect, title))
-    return result
+    taken = {effect.name for effect in model.effects}
+    return result + [candidate for candidate in one_way() if candidate.effect.name not in taken]
 
 
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
-from udd.effects.user_defined import written
+from udd.effects.user_defined import FormulaSpec, written
 from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
@@ -22,6 +22,7 @@ POWERS = (0.2, 0.4, 0.7, 1.4, 1.7, 2.5)
 #: Settling times of friction, in units of the record's length.
 DURATIONS = (0.02, 0.05, 0.12, 0.3, 0.7)
 _WIDTHS = (0.06, 0.15, 0.4)  # share of the visited range
+_ANGLES = (0.1, 0.3, 0.8)  # the same of an angle, rad
 _SPEEDS = 9  # parts of the range of speeds; drag may begin in the middle of each
 _ROUND = 1e-3  # share of a speed's root mean square within which corners are rounded off
 _TURNS = 0.03  # the same for the sign of dry friction under load
@@ -138,6 +139,33 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
         tried = [{"b": speed} for speed in speeds(joint.speeds)]
         result.append(_listed(model, joint, "drag above a speed", beyond, {"c": _BRAKE}, tried))
     return [listed for listed in result if listed]
+
+
+def one_way() -> list[Candidate]:
+    """List frictions of a disk or a pendulum that differ by the direction of motion: even in the speed."""
+    result = []
+    for name, title, text in (
+        ("one_way", "friction that depends on the direction", "-a*abs(Omega)"),
+        ("one_way_drag", "quadratic drag that depends on the direction", "-a*Omega^2"),
+    ):
+        spec = written("torque", text, name, title, ["a"], None, ("a",))
+        result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title))
+    return result
+
+
+def further() -> tuple[FormulaSpec, ...]:
+    """Describe frictions that the library lacks: dry near an angle, and saturating."""
+    text, brake = "-a*exp(-(2*sin((beta - c)/2)/s)^2)*tanh(Omega/0.05)", (0.0, np.inf)
+    ranges = {"a": brake, "s": (1e-3, np.inf)}
+    local = written("torque", text, "dry_brake", "dry friction near an angle", ["a"], ranges, ("a", "c", "s"))
+    ranges, title = {"a": brake, "b": (1e-3, np.inf)}, "friction that saturates with the speed"
+    bounded = written("torque", "-a*tanh(Omega/b)", "saturating", title, ["a"], ranges, ("a", "b"))
+    (a, c, s), (most, b) = local.parameters, bounded.parameters
+    place = replace(c, role="scanned", along="angle")
+    return (
+        replace(local, parameters=(a, place, replace(s, role="shape", grid=_ANGLES))),
+        replace(bounded, parameters=(most, replace(b, role="scanned", along="speed"))),
+    )
 
 
 def _listed(

@@ -18,7 +18,7 @@ from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
 from .forcing import Responses, responses, score_forcings
-from .friction_terms import DURATIONS, POWERS, frictions, places, speeds
+from .friction_terms import DURATIONS, POWERS, frictions, further, places, speeds
 from .score_scan import Scored, score_of
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def _candidates(fit: Fit) -> Iterator[list[Candidate]]:
     if isinstance(model, FormulaModel):
         yield from (c for c in frictions(model, fit.states, duration) if c[0].effect.name not in there)
         return
-    for spec in effects.library():
+    for spec in (*effects.library(), *further()):
         scanned = next((p for p in spec.parameters if p.role == "scanned"), None)
         if scanned is None or spec.name in there or model.kind not in spec.bodies:
             continue
