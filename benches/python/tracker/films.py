@@ -66,6 +66,7 @@ CASES = (
     Case("mirrored", (0.04, 0.5, 0.01), {}, {"mirrored": True}),
     Case("held in the hand, 2 px", (0.05, 1.5, 0.01), {}, {"shake": 2.0}),
     Case("held in the hand, 8 px", (0.08, 3.0, 0.02), {}, {"shake": 8.0}),
+    Case("disk ejected, held in the hand", (0.08, 3.0, 0.02), {}, {"after": 3.0, "shake": 3.0}, ejected=True),
     Case("bumped", (0.05, 0.7, 0.01), {}, {"bumps": ((6.0, 14.0, -9.0),)}),
     Case("bumped and back", (0.05, 0.7, 0.01), {}, {"bumps": ((6.0, 14.0, -9.0), (8.0, 0.0, 0.0))}),
     Case("zoomed by 1.25", (0.05, 0.7, 0.02), {}, {"zooms": ((6.0, 1.25),)}),
