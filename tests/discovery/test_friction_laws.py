@@ -10,6 +10,7 @@ import pytest
 import udd
 from udd.discovery.proposals import Proposals
 from udd.discovery.score_rounds import ScoreRound, score_round
+from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.shape_scan import strongest_shapes
 from udd.discovery.time_budget import Clock
 from udd.discovery.trial_fits import of_library
@@ -194,3 +195,11 @@ def test_a_law_of_the_speed_is_no_brake_near_an_angle_and_no_constant_torque(law
     found = udd.discover(seen(plain.with_effects([law]), noise=2e-3), plain, progress=False)
     assert name in [one.effect.name for one in found.effects]
     assert not {"local_brake", "constant_torque"} & {one.effect.name for one in found.effects}
+
+
+@pytest.mark.parametrize(("offset", "listed"), [(0.0, True), (6.0, False)])
+def test_only_a_motion_that_turns_back_shows_friction_in_one_direction(offset, listed):
+    speed = 3.0 * np.sin(np.arange(0, 20, 0.1)) + offset
+    states = np.column_stack([speed, np.zeros((len(speed), 3))])
+    names = {one.effect.name for one in library(udd.Disk(0.04), states=states)}
+    assert ({"one_way", "one_way_drag"} <= names) is listed

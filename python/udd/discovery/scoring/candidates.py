@@ -36,9 +36,9 @@ def library(
     """List every effect that can be added to a model, in each of its variants, except scanned ones.
 
     For a user's own model they are made of its states (:mod:`udd.discovery.scoring.term_library`). Dry
-    friction is included if a motion, (n, d), is given: it determines the width of its smoothed sign. `given`
-    candidates come first. Terms that the free parameters absorb are not removed here, because that depends on
-    the data.
+    friction is included if a motion, (n, d), is given: it determines the width of its smoothed sign. So is
+    friction that depends on the direction, for other models. `given` candidates come first. Terms that the
+    free parameters absorb are not removed here, because that depends on the data.
     """
     if isinstance(model, FormulaModel):
         from .friction_terms import load_frictions
@@ -67,7 +67,8 @@ def library(
                 title = spec.title + (f" ({', '.join(notes)})" if notes else "")
                 result.append(Candidate(effect, title))
     taken = {effect.name for effect in model.effects}
-    return result + [candidate for candidate in one_way() if candidate.effect.name not in taken]
+    speed = np.ones(1) if states is None else states[:, model.state_names.index("Omega")]
+    return result + [candidate for candidate in one_way(speed) if candidate.effect.name not in taken]
 
 
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:

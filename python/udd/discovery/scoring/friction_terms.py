@@ -141,9 +141,14 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
     return [listed for listed in result if listed]
 
 
-def one_way() -> list[Candidate]:
-    """List frictions of a disk or a pendulum that differ by the direction of motion: even in the speed."""
-    result = []
+def one_way(speed: Array) -> list[Candidate]:
+    """List frictions of a disk or a pendulum that differ by the direction of motion: even in the speed.
+
+    A motion (n,) that hardly turns back does not distinguish them from other friction.
+    """
+    result: list[Candidate] = []
+    if not abs(np.mean(speed)) < np.std(speed):
+        return result
     for name, title, text in (
         ("one_way", "friction that depends on the direction", "-a*abs(Omega)"),
         ("one_way_drag", "quadratic drag that depends on the direction", "-a*Omega^2"),
