@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
-from udd.discovery.scoring.candidate import brakes_with_time, depends_on_angle
+from udd.discovery.scoring.candidate import brakes_with_time, like_geometry
 from udd.discovery.scoring.look_alikes import by_parameter
 from udd.discovery.symbolic.expressions import length
 from udd.effects import Effect
@@ -83,13 +83,13 @@ class Hypothesis:
         """Log evidence of all data, minus the cost of a curve's freedom, plus the log prior.
 
         The geometry of a film is less accurate than its noise suggests. A curve, a formula, a shape and a law
-        of the angle pay in units of the geometry's assumed error; plain laws do not.
+        that resembles its faults pay in units of the geometry's assumed error; plain laws do not.
         """
         fitted = self.again.fit
         # Without this a real pendulum's quadratic drag becomes a curve, a power, or friction near an angle.
         unsure = max(fitted.scatter, 1.0) / fitted.shown - 1.0
         shapes = sum(c.shapes for c in self.trial.candidates) * math.log(fitted.observations) / 2
-        angles = EVIDENCE_MARGIN * sum(depends_on_angle(c.effect) for c in self.trial.candidates)
+        angles = EVIDENCE_MARGIN * sum(like_geometry(c.effect) for c in self.trial.candidates)
         cost = spent(self.again) + shapes + angles - (self.prior if self.trial.curve is not None else 0.0)
         return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior - cost * unsure
 

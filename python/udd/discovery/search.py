@@ -32,7 +32,7 @@ from .thresholds import ALPHA, RejectionReason
 from .time_budget import TimeUpError
 from .trial_fits import fitted_ones, needed_in, of_library
 
-_NEAREST = 4  # closest candidates to report if none passes
+_NEAREST = 6  # closest candidates to report if none passes
 _MOST = 3  # maximum of added effects
 _CURVES = 2  # most probable curves that are located
 _LIKELY = 0.5  # minimum evidence of these, as a share of the highest

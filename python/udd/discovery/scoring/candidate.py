@@ -60,9 +60,18 @@ class Candidate:
         return [f"{self.effect.name}.{p}" for p in self.effect.amplitudes]
 
 
-def depends_on_angle(effect: effects.Effect) -> bool:
-    """Return True if an effect depends on the angle itself, as faults of a film's geometry do."""
-    return bool(re.search(r"\b(theta|beta)\b", effect.equation))
+#: Frictions of a pendulum or a disk that are even in the speed.
+ONE_WAY = ("one_way", "one_way_drag")
+
+
+def like_geometry(effect: effects.Effect) -> bool:
+    """Return True if faults of a film's geometry resemble an effect.
+
+    Laws of the angle itself do. So does friction that depends on the direction: it moves the middle of a
+    swing as its size changes.
+    """
+    # Without the second a real pendulum on a string has such friction.
+    return bool(re.search(r"\b(theta|beta)\b", effect.equation)) or effect.name in ONE_WAY
 
 
 def brakes_with_time(effect: effects.Effect) -> bool:

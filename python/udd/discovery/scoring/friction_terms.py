@@ -12,7 +12,7 @@ from udd import effects
 from udd.effects.user_defined import FormulaSpec, written
 from udd.models.formula_model import FormulaModel
 
-from .candidate import Candidate
+from .candidate import ONE_WAY, Candidate
 from .term_library import unused_names, word_for
 
 Array = NDArray[np.float64]
@@ -149,9 +149,11 @@ def one_way(speed: Array) -> list[Candidate]:
     result: list[Candidate] = []
     if not abs(np.mean(speed)) < np.std(speed):
         return result
-    for name, title, text in (
-        ("one_way", "friction that depends on the direction", "-a*abs(Omega)"),
-        ("one_way_drag", "quadratic drag that depends on the direction", "-a*Omega^2"),
+    for name, title, text in zip(
+        ONE_WAY,
+        ("friction that depends on the direction", "quadratic drag that depends on the direction"),
+        ("-a*abs(Omega)", "-a*Omega^2"),
+        strict=True,
     ):
         spec = written("torque", text, name, title, ["a"], None, ("a",))
         result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title))
