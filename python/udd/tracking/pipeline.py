@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
@@ -476,8 +477,17 @@ def _to_metres(
     try:
         check_length(m)
     except ValueError as error:
-        raise TrackError(f"{film.path}: {error}") from None
+        raise TrackError(f"{film.path}: {error}{_commonest(flags)}") from None
     return Tracking(m, tracks, disk.state, camera, disk.rim)
+
+
+def _commonest(flags: Sequence[str]) -> str:
+    """Return the reason that most frames without a position have, as the end of a message."""
+    reasons = Counter(flag for flag in flags if flag)
+    if not reasons:
+        return ""
+    reason, count = reasons.most_common(1)[0]
+    return f"; in {count} of {len(flags)} frames: {reason}"
 
 
 def _upright(
