@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,19 +33,19 @@ def growing_components(model: Model, size: _Floats, t: float = 0.0) -> NDArray[n
     """
     if not model.profile.written or model.inputs:
         return np.zeros(0, dtype=np.intp)
-    size = np.where(size > 0.0, size, 1.0)
-    probes = size * np.random.default_rng(5).uniform(0.1, 1.0, (4, len(size)))
+    each = np.arange(len(size))
     # All at once: the probes, and for each component the probes with that one at zero.
-    rows = np.repeat(probes[None], len(size) + 1, axis=0)
-    for k in range(len(size)):
-        rows[k + 1, :, k] = 0.0
-    rates = model.rates(t, rows)
-    some = []
-    for k in range(len(size)):
-        usual, without = np.abs(rates[0, :, k]), np.abs(rates[k + 1, :, k])
-        if np.isfinite(usual).all() and (without <= _VANISHES * usual).all() and usual.any():
-            some.append(k)
-    return np.array(some, dtype=np.intp)
+    rows = np.repeat((np.where(size > 0.0, size, 1.0) * _parts(len(size)))[None], len(size) + 1, axis=0)
+    rows[each + 1, :, each] = 0.0
+    rates = np.abs(model.rates(t, rows))
+    usual, without = rates[0].T, rates[each + 1, :, each]
+    vanishes = np.isfinite(usual) & (without <= _VANISHES * usual)
+    return np.flatnonzero(vanishes.all(axis=1) & usual.any(axis=1))
+
+
+@cache
+def _parts(count: int) -> _Floats:
+    return np.random.default_rng(5).uniform(0.1, 1.0, (4, count))
 
 
 def warn_from(model: Model, start: _Floats, begin: float, span: float, rtol: float, atol: float) -> bool:
