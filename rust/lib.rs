@@ -5,7 +5,7 @@
 //! integrated) → [`tape`] (its power series) → [`integrate`] (how a step is taken) → [`observe`] (what is seen on the way) → [`analysis`] (runs, sections,
 //! exponents) → [`estimate`] (what measured motion says about the model) → `python` (pyo3 only, behind the feature `python`).
 //! [`image`], the inner loop of the tracker, and [`memory`] use none of these. The files
-//! `sides`, `tolerance` and `failure` are below all layers.
+//! `sides`, `tolerance`, `failure` and `latest` are below all layers.
 
 // Formulas over components are read with their indices.
 #![allow(clippy::needless_range_loop)]
@@ -17,6 +17,7 @@ pub mod formula;
 pub mod image;
 pub mod integrate;
 mod inverse;
+mod latest;
 pub mod machine;
 pub mod memory;
 pub mod model;

@@ -63,8 +63,12 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
                 let dt = size.scale(part);
                 let x = if part == 1.0 { end } else { self.real_at(dt, &[true; D]) };
                 let strays = Strays { method: &mut *self, at, from: &from, x: &x, size, error, dt, norm };
-                // Packets are only fast with their own instructions.
-                if const { S::Real::LANES > 1 } { S::Real::work(isa, strays) } else { strays.run::<Plain>() }
+                // Worth a copy for each instruction set where all lanes and states are side by side.
+                if const { S::IS_PLAIN || S::Real::LANES > 1 } {
+                    S::Real::work(isa, strays)
+                } else {
+                    strays.run::<Plain>()
+                }
             };
             bad = strays(1.0);
             // A coordinate may leave a spline's cell and return to it.

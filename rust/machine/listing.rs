@@ -140,11 +140,17 @@ impl Listing {
         self.push(Line::Store(place, from));
     }
 
-    /// `to = a . b`; constants have to be loaded first.
+    /// `to = a . b`; constants for several numbers at once have to be loaded first.
     pub fn apply(&mut self, operation: Operation, to: Register, a: Register, b: impl Into<Operand>) {
         let b = self.checked(b.into());
-        assert!(!matches!(b, Operand::Place(Place(Array::Constants, _))), "a constant is not loaded");
+        let is_constant = matches!(b, Operand::Place(Place(Array::Constants, _)));
+        assert!(!is_constant || self.width == 1, "a constant is not loaded");
         self.push(Line::Apply(operation, to, a, b));
+    }
+
+    /// How many elements the next operations take.
+    pub fn width(&self) -> usize {
+        self.width
     }
 
     /// Lets the next operations take so many elements at once: 1, 2 or 4.

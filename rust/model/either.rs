@@ -107,6 +107,10 @@ impl<A: Family<D>, B: Family<D>, const D: usize> Family<D> for Either<A, B> {
         ask!(self, family => family.goes_in_packets())
     }
 
+    fn law(&self) -> Option<u64> {
+        ask!(self, family => family.law())
+    }
+
     fn idle(&self) -> usize {
         ask!(self, family => family.idle())
     }

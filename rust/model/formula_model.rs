@@ -1,6 +1,7 @@
 //! A model of the user's own, given as text.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::sliding_mode::{self, SlidingSurface};
 use super::{
@@ -18,6 +19,7 @@ pub const MAX_INPUTS: usize = 8;
 /// The programs of the rates and of the surfaces on which they have kinks.
 #[derive(Debug, PartialEq)]
 struct Law {
+    number: Number,
     rates: Program,
     /// The rates with comparisons in place of surfaces.
     written: Program,
@@ -34,7 +36,21 @@ impl Law {
         let slides = !kinks.sliding.is_empty();
         let takes = |n: usize| kinks.surfaces.iter().any(|own| own.ops().contains(&Op::Push(Leaf::State(n))));
         let watched = (0..equations.len()).map(|n| slides || takes(n)).collect();
-        Self { rates: Program::of(equations), written, surfaces, watched, kinks }
+        let number = Number(LAWS.fetch_add(1, Ordering::Relaxed));
+        Self { number, rates: Program::of(equations), written, surfaces, watched, kinks }
+    }
+}
+
+/// How many laws there were before.
+#[derive(Debug)]
+struct Number(u64);
+
+static LAWS: AtomicU64 = AtomicU64::new(0);
+
+impl PartialEq for Number {
+    /// Laws are equal if their equations are.
+    fn eq(&self, _other: &Self) -> bool {
+        true
     }
 }
 
@@ -425,6 +441,10 @@ impl<const D: usize> Family<D> for FormulaFamily<D> {
 
     fn goes_in_packets(&self) -> bool {
         self.law.surfaces.is_empty() && self.inputs == 0
+    }
+
+    fn law(&self) -> Option<u64> {
+        Some(self.law.number.0)
     }
 
     fn idle(&self) -> usize {

@@ -275,6 +275,11 @@ pub trait Family<const D: usize>: Clone + PartialEq + Send + Sync {
         0
     }
 
+    /// A number that all families with the same law, and no others, have; none if the law is compiled.
+    fn law(&self) -> Option<u64> {
+        None
+    }
+
     /// The parameters, in the order in which [`Family::build`] takes their values.
     fn parameters(&self) -> Vec<Parameter>;
 

@@ -11,6 +11,7 @@ use super::interrupt;
 use crate::analysis::batch::rows::tape;
 use crate::estimate::{FormulaSensor, Moment, Sensor, seen};
 use crate::formula::{Names, is_reserved};
+use crate::latest::Latest;
 use crate::model::effects::{Body, Formula, FrictionModel, Kind, Slot, Source};
 use crate::model::{
     DiskFamily, DleFamily, Effect, Either, Family, FormulaFamily, MAX_INPUTS, Momentum, Observation,
@@ -277,9 +278,44 @@ impl InputSignal<'_> {
     }
 }
 
+/// The latest models without values and records, each with the texts that it was parsed from.
+static LATEST: Latest<(Vec<Vec<String>>, Vec<ChannelSpec>), AnyModel> = Latest::new();
+
+/// A model of the user's own; equal texts are parsed once.
 fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
     let FormulaModelSpec { states, equations, parameters, angles, inputs, delays, records, record, observe } =
         spec;
+    let texts = [states, equations, parameters, angles, inputs].map(Clone::clone);
+    let model = LATEST.get((texts.to_vec(), observe.clone()), || own_law(spec))?;
+    let delay =
+        |name: &Option<String>| name.as_ref().and_then(|name| parameters.iter().position(|p| p == name));
+    let delays: Vec<Option<usize>> = delays.iter().map(delay).collect();
+    let mut signals = Vec::with_capacity(records.len());
+    for record in records {
+        if record.len() != inputs.len() || delays.len() != inputs.len() {
+            return Err(ModelError::new_err("each record needs a signal for every input"));
+        }
+        let own = record.iter().zip(&delays).map(|(signal, &delay)| signal.read(delay));
+        signals.push(Signals::new(own.collect::<PyResult<_>>()?));
+    }
+    use AnyModel::{Four, Six, Three, Twelve, Two};
+    Ok(match model {
+        Two(Either::Second(family), _) => Two(Either::Second(family.with_records(signals, *record)), values),
+        Three(Either::Second(family), _) => {
+            Three(Either::Second(family.with_records(signals, *record)), values)
+        }
+        Four(Either::Second(family), _) => {
+            Four(Either::Second(family.with_records(signals, *record)), values)
+        }
+        Six(family, _) => Six(family.with_records(signals, *record), values),
+        Twelve(family, _) => Twelve(family.with_records(signals, *record), values),
+        other => other,
+    })
+}
+
+/// The same without values and records.
+fn own_law(spec: &FormulaModelSpec<'_>) -> PyResult<AnyModel> {
+    let FormulaModelSpec { states, equations, parameters, angles, inputs, observe, .. } = spec;
     let all = || states.iter().chain(parameters).chain(inputs);
     for (i, name) in all().enumerate() {
         let what = match i {
@@ -304,26 +340,14 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
         let message = format!("a model has at most {MAX_INPUTS} inputs, not {}", inputs.len());
         return Err(ModelError::new_err(message));
     }
-    let delay =
-        |name: &Option<String>| name.as_ref().and_then(|name| parameters.iter().position(|p| p == name));
-    let delays: Vec<Option<usize>> = delays.iter().map(delay).collect();
-    let mut signals = Vec::with_capacity(records.len());
-    for record in records {
-        if record.len() != inputs.len() || delays.len() != inputs.len() {
-            return Err(ModelError::new_err("each record needs a signal for every input"));
-        }
-        let own = record.iter().zip(&delays).map(|(signal, &delay)| signal.read(delay));
-        signals.push(Signals::new(own.collect::<PyResult<_>>()?));
-    }
     let observation = observation(observe, Names { states, parameters, inputs: &[], rates: true })?;
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     macro_rules! parsed {
         ($($count:pat => $Kind:ident<$D:literal> |$family:ident| $held:expr),+) => {
             match states.len() {
                 $($count => FormulaFamily::<$D>::parse(states, &texts, parameters, inputs).map(|family| {
-                    let $family =
-                        family.with_angles(angles).with_records(signals, *record).with_observation(observation);
-                    AnyModel::$Kind($held, values)
+                    let $family = family.with_angles(angles).with_observation(observation);
+                    AnyModel::$Kind($held, Vec::new())
                 }),)+
                 n => return Err(ModelError::new_err(format!("a model has 1 to 12 states, not {n}"))),
             }

@@ -5,6 +5,7 @@
 
 use super::fuse::{Chain, First, Program, Then};
 use super::group::{MOST, Plan, Task, Work};
+use super::kept::Kept;
 use super::node::{INVERSE, Node, Step};
 use crate::machine::{Array, Code, Listing, Operand, Operation, Place, Register};
 use crate::model::{PIECE_COEFFICIENTS, Sides};
@@ -35,7 +36,7 @@ const HALF: Register = Register(4);
 pub(super) fn series(program: &Program, isa: Isa, lanes: usize, room: usize, order: usize) -> Option<Code> {
     let rows = program.slots * room;
     let held = rows + MOST * program.plan.rows.len() * room;
-    let mut code = Series { list: Listing::new(isa, lanes), rows, held, room, k: 0, in_rows: false };
+    let mut code = Series { rows, held, ..Series::new(Listing::new(isa, lanes), room) };
     let sign = code.list.constant(-0.0);
     if lanes == 1 {
         code.begin(&program.plan);
@@ -83,8 +84,7 @@ impl Start {
 
 /// Code for the coefficients of order 0, with room for `room` coefficients in each series.
 pub(super) fn start(program: &Program, isa: Isa, lanes: usize, room: usize) -> Option<Start> {
-    let list = Listing::new(isa, lanes);
-    let mut code = Series { list, rows: 0, held: 0, room, k: 0, in_rows: false };
+    let mut code = Series::new(Listing::new(isa, lanes), room);
     let mut interpreted = Vec::new();
     let sign = code.list.constant(-0.0);
     code.list.load(SIGN, sign);
@@ -94,6 +94,7 @@ pub(super) fn start(program: &Program, isa: Isa, lanes: usize, room: usize) -> O
             && code.first(step).is_none()
         {
             interpreted.push(step);
+            code.kept = Kept::default();
             code.list.end();
             code.list.load(SIGN, sign);
         }
@@ -117,9 +118,14 @@ struct Series {
     k: usize,
     /// Slots are the numbers of rows now, and held values those of their rows.
     in_rows: bool,
+    kept: Kept,
 }
 
 impl Series {
+    fn new(list: Listing, room: usize) -> Self {
+        Self { list, rows: 0, held: 0, room, k: 0, in_rows: false, kept: Kept::default() }
+    }
+
     fn order(&mut self, program: &Program) {
         for stretch in &program.stretches {
             stretch.chains.iter().for_each(|chain| self.chain(chain));
@@ -163,9 +169,9 @@ impl Series {
                 for &(row, is_rate) in scattered {
                     let k = self.k + usize::from(is_rate);
                     let places = self.places(&plan.rows[row].slots, k);
-                    let row = self.in_row(row, k);
-                    self.list.load(C, row);
-                    self.list.scatter(&places, C, HALF);
+                    let row = self.operand_at(self.in_row(row, k));
+                    let row = self.loaded(row, C);
+                    self.list.scatter(&places, row, HALF);
                 }
             }
         }
@@ -181,7 +187,7 @@ impl Series {
     fn gather(&mut self, row: usize, slots: &[u16]) {
         let places = self.places(slots, self.k);
         self.list.gather(C, HALF, &places);
-        self.list.store(self.in_row(row, self.k), C);
+        self.put(self.in_row(row, self.k), C);
     }
 
     fn places(&self, slots: &[u16], k: usize) -> Vec<Place> {
@@ -192,7 +198,7 @@ impl Series {
         Place(Array::Work, self.rows + MOST * (row * self.room + k))
     }
 
-    fn at(&self, slot: u16, k: usize) -> Place {
+    fn place(&self, slot: u16, k: usize) -> Place {
         if self.in_rows {
             self.in_row(usize::from(slot), k)
         } else {
@@ -208,14 +214,41 @@ impl Series {
         }
     }
 
+    /// The number stored at a place, in its register or there.
+    fn operand_at(&mut self, place: Place) -> Operand {
+        self.kept.of(place, self.list.width()).map_or(place.into(), Operand::from)
+    }
+
+    /// A coefficient.
+    fn at(&mut self, slot: u16, k: usize) -> Operand {
+        self.operand_at(self.place(slot, k))
+    }
+
+    /// An operand in its register, or loaded into this one.
+    fn loaded(&mut self, operand: Operand, to: Register) -> Register {
+        match operand {
+            Operand::Register(register) => register,
+            place @ Operand::Place(_) => {
+                self.list.load(to, place);
+                to
+            }
+        }
+    }
+
     fn load(&mut self, to: Register, slot: u16, k: usize) {
-        let place = self.at(slot, k);
-        self.list.load(to, place);
+        let operand = self.at(slot, k);
+        self.list.load(to, operand);
+    }
+
+    /// Stores a result.
+    fn put(&mut self, place: Place, from: Register) {
+        self.list.store(place, from);
+        let kept = self.kept.room(place, self.list.width());
+        self.list.load(kept, from);
     }
 
     fn store(&mut self, slot: u16) {
-        let place = self.at(slot, self.k);
-        self.list.store(place, C);
+        self.put(self.place(slot, self.k), C);
     }
 
     fn apply(&mut self, operation: Operation, b: impl Into<Operand>) {
@@ -225,6 +258,9 @@ impl Series {
     /// `c` times a constant.
     fn scale(&mut self, factor: f64) {
         let factor = self.list.constant(factor);
+        if self.list.width() == 1 {
+            return self.apply(Operation::Mul, factor);
+        }
         self.list.load(FACTOR, factor);
         self.apply(Operation::Mul, FACTOR);
     }
@@ -234,23 +270,23 @@ impl Series {
         if self.k > 0 {
             self.scale(INVERSE[self.k + 1]);
         }
-        let place = self.at(n, self.k + 1);
-        self.list.store(place, C);
+        self.put(self.place(n, self.k + 1), C);
     }
 
     /// Adds `a b` to the sum in a register, if there is one yet; returns that there is.
     fn with(&mut self, sum: Register, any: bool, a: (u16, usize), b: (u16, usize)) -> bool {
-        self.load(FACTOR, a.0, a.1);
+        let a = self.at(a.0, a.1);
+        let a = self.loaded(a, FACTOR);
         let b = self.at(b.0, b.1);
-        self.times(sum, any, b)
+        self.times(sum, any, a, b)
     }
 
     /// The same where the factor `a` is loaded.
-    fn times(&mut self, sum: Register, any: bool, b: impl Into<Operand>) -> bool {
+    fn times(&mut self, sum: Register, any: bool, a: Register, b: impl Into<Operand>) -> bool {
         // Adding to -0 changes nothing.
         match any {
-            true => self.list.apply(Operation::Fused, sum, FACTOR, b),
-            false => self.list.apply(Operation::Mul, sum, FACTOR, b),
+            true => self.list.apply(Operation::Fused, sum, a, b),
+            false => self.list.apply(Operation::Mul, sum, a, b),
         }
         true
     }
@@ -304,7 +340,7 @@ impl Series {
                 self.load(FACTOR, a, 0);
                 self.list.apply(Operation::Add, FACTOR, FACTOR, FACTOR);
                 let last = self.at(a, k);
-                self.times(C, any, last);
+                self.times(C, any, FACTOR, last);
             }
         }
         for &then in &chain.then[..usize::from(chain.count)] {
@@ -330,16 +366,20 @@ impl Series {
             }
             Then::Plus(_) | Then::Minus(_) => {}
             Then::Neg | Then::FromHeld(_) => self.apply(Xor, SIGN),
-            Then::Add(a) => self.apply(Add, self.at(a, k)),
-            Then::Sub(a) => self.apply(Sub, self.at(a, k)),
+            Then::Add(a) | Then::Sub(a) => {
+                let a = self.at(a, k);
+                self.apply(if matches!(then, Then::Add(_)) { Add } else { Sub }, a);
+            }
             Then::Scale(h) => self.apply(Mul, self.held(h)),
             Then::From(a) => {
-                self.load(FACTOR, a, k);
-                self.list.apply(Sub, C, FACTOR, C);
+                let a = self.at(a, k);
+                let a = self.loaded(a, FACTOR);
+                self.list.apply(Sub, C, a, C);
             }
             Then::AddScaled(a, h) | Then::SubScaled(a, h) | Then::FromScaled(a, h) => {
-                self.load(FACTOR, a, k);
-                self.list.apply(Mul, FACTOR, FACTOR, self.held(h));
+                let a = self.at(a, k);
+                let a = self.loaded(a, FACTOR);
+                self.list.apply(Mul, FACTOR, a, self.held(h));
                 match then {
                     Then::AddScaled(..) => self.apply(Add, FACTOR),
                     Then::SubScaled(..) => self.apply(Sub, FACTOR),
@@ -354,12 +394,13 @@ impl Series {
         let to = step.to;
         match step.node {
             // Done with the sine and the tangent.
-            Node::Cos(_) | Node::Slope(_) => return Some(()),
+            Node::Cos(_) | Node::CosOfTime(_) | Node::Slope(_) => return Some(()),
             Node::Hold(h) => self.list.load(C, self.held(h)),
             Node::Select(side, a, b) => self.select(side, a, b),
             Node::Div(a, b) => {
                 self.inverse(1.0, (b, 0), to + 1);
-                self.list.apply(Operation::Mul, C, FACTOR, self.at(a, 0));
+                let a = self.at(a, 0);
+                self.list.apply(Operation::Mul, C, FACTOR, a);
             }
             Node::Over(h, b) => {
                 self.inverse(1.0, (b, 0), to + 1);
@@ -384,8 +425,7 @@ impl Series {
         self.list.load(FACTOR, number);
         let of = self.at(of.0, of.1);
         self.list.apply(Operation::Div, FACTOR, FACTOR, of);
-        let place = self.at(to, 0);
-        self.list.store(place, FACTOR);
+        self.put(self.place(to, 0), FACTOR);
     }
 
     /// `c` by the side of a surface.
@@ -422,45 +462,61 @@ impl Series {
                 if let Node::Div(a, _) = step.node {
                     self.load(FACTOR, a, k);
                     self.list.apply(Sub, C, FACTOR, C);
-                    self.apply(Mul, self.at(to + 1, 0));
+                    let inverse = self.at(to + 1, 0);
+                    self.apply(Mul, inverse);
                 } else {
-                    self.apply(Mul, self.at(to + 1, 0));
+                    let inverse = self.at(to + 1, 0);
+                    self.apply(Mul, inverse);
                     self.apply(Xor, SIGN);
                 }
             }
             Node::Sqrt(a) => {
                 self.load(FACTOR, a, k);
                 self.list.apply(Sub, C, FACTOR, sum);
-                self.apply(Mul, self.at(to + 1, 0));
+                let inverse = self.at(to + 1, 0);
+                self.apply(Mul, inverse);
             }
             Node::Exp(a) => {
                 self.slope(a, to + 1);
                 let own = self.at(to, 0);
-                self.times(C, any, own);
+                self.times(C, any, FACTOR, own);
                 self.scale(INVERSE[k]);
             }
             Node::Ln(a) => {
                 self.weighted(a);
                 self.list.apply(Sub, C, FACTOR, sum);
-                self.apply(Mul, self.at(to + 2, 0));
+                let inverse = self.at(to + 2, 0);
+                self.apply(Mul, inverse);
                 self.store(to + 1);
                 self.scale(INVERSE[k]);
             }
             Node::Sin(a) | Node::Tanh(a) => {
                 self.slope(a, to + 2);
                 let other = self.at(to + 1, 0);
-                self.times(C, any, other);
+                self.times(C, any, FACTOR, other);
                 self.scale(INVERSE[k]);
             }
             Node::Cos(sine) => {
                 self.with(C, any, (sine + 2, k), (sine, 0));
                 self.scale(-INVERSE[k]);
             }
+            Node::SinOfTime(a) => {
+                if k == 1 {
+                    self.load(FACTOR, a, 1);
+                    self.put(self.place(to + 2, 1), FACTOR);
+                }
+                self.with(C, false, (to + 2, 1), (to + 1, k - 1));
+                self.scale(INVERSE[k]);
+            }
+            Node::CosOfTime(sine) => {
+                self.with(C, false, (sine + 2, 1), (sine, k - 1));
+                self.scale(-INVERSE[k]);
+            }
             Node::Slope(tanh) => {
                 self.load(FACTOR, tanh, 0);
                 self.list.apply(Add, FACTOR, FACTOR, FACTOR);
                 let last = self.at(tanh, k);
-                self.times(C, any, last);
+                self.times(C, any, FACTOR, last);
                 self.apply(Xor, SIGN);
             }
             Node::Select(side, a, b) => self.select(side, a, b),
@@ -488,8 +544,7 @@ impl Series {
     /// The same, stored too.
     fn slope(&mut self, a: u16, to: u16) {
         self.weighted(a);
-        let place = self.at(to, self.k);
-        self.list.store(place, FACTOR);
+        self.put(self.place(to, self.k), FACTOR);
     }
 }
 
@@ -506,11 +561,13 @@ mod tests {
     const ISAS: [Isa; 2] = [Isa::Avx2, Isa::Avx512];
 
     /// Laws of every kind of operation, with kinks and time.
-    const LAWS: [[&str; 3]; 8] = [
+    const LAWS: [[&str; 3]; 9] = [
         ["x*(k - z) - y", "abs(x)*y + z^3", "max(x, y)*sign(z) - c*x*y"],
         ["sin(x*y) + cos(x)", "exp(-x^2)*z + tanh(y*c + z)", "ln(3 + x^2) - sqrt(2 + y^2)"],
         ["x/(2 + y^2)", "k/(3 + x*z)", "cos(t)*x - min(t, y)"],
         ["1", "sqrt(4 + t)*z - x", "where(x > y, x*y, z*z) + ln(2 + t)"],
+        // Sines of time, and of what is not linear in it.
+        ["sin(k*t)*x - y", "cos(2 - c*t)*z + sin(k*t)", "cos(t*t)*x - sin(t + x)"],
         // The same operations side by side.
         ["k*x*y - z", "c*y*z - x", "k*z*x - y"],
         ["sin(x)*k + tanh(y*z)", "sin(y)*c + tanh(x*z)", "cos(z)*sin(x*y)"],

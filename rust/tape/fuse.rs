@@ -149,6 +149,8 @@ impl Node {
             Node::Ln(a) => Node::Ln(slot(a)),
             Node::Sin(a) => Node::Sin(slot(a)),
             Node::Cos(a) => Node::Cos(slot(a)),
+            Node::SinOfTime(a) => Node::SinOfTime(slot(a)),
+            Node::CosOfTime(a) => Node::CosOfTime(slot(a)),
             Node::Tanh(a) => Node::Tanh(slot(a)),
             Node::Slope(a) => Node::Slope(slot(a)),
             Node::Select(side, a, b) => Node::Select(side, slot(a), slot(b)),
@@ -169,7 +171,8 @@ impl Node {
             Node::Square(a) | Node::Over(_, a) | Node::Sqrt(a) | Node::Exp(a) | Node::Ln(a) => {
                 (Some(a), None)
             }
-            Node::Sin(a) | Node::Cos(a) | Node::Tanh(a) | Node::Slope(a) => (Some(a), None),
+            Node::Sin(a) | Node::Cos(a) | Node::SinOfTime(a) | Node::CosOfTime(a) => (Some(a), None),
+            Node::Tanh(a) | Node::Slope(a) => (Some(a), None),
             Node::Piece(place, ..) => (Some(place), None),
         };
         a.into_iter().chain(b)

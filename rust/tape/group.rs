@@ -4,6 +4,8 @@
 //! chain of oscillators, their series are stored side by side as a row, and one instruction serves them all. Each lane
 //! has the operations of the equation by itself, so no bit changes.
 
+use std::collections::{BTreeMap, HashMap, HashSet};
+
 use super::fuse::{Chain, First, Program};
 use super::node::{Node, Step};
 
@@ -113,6 +115,49 @@ fn operands(bundle: &Bundle) -> Vec<u16> {
     bundle[0].operands()
 }
 
+/// Rows that operations need.
+#[derive(Default)]
+struct Wanted {
+    rows: Vec<Vec<u16>>,
+    known: HashSet<Vec<u16>>,
+}
+
+impl Wanted {
+    /// The operations of a level in groups of the same kind, at most [`MOST`] in each, as they are wanted.
+    fn side_by_side(&mut self, level: Vec<Bundle>) -> Vec<Vec<Bundle>> {
+        let mut kinds: Vec<(Vec<Work>, Vec<Bundle>)> = Vec::new();
+        for bundle in level {
+            let kind: Vec<Work> = bundle.iter().map(|work| work.kind()).collect();
+            match kinds.iter_mut().find(|(other, _)| *other == kind) {
+                Some((_, bundles)) => bundles.push(bundle),
+                None => kinds.push((kind, vec![bundle])),
+            }
+        }
+        let mut groups = Vec::new();
+        for (_, bundles) in kinds {
+            let mut by_result: BTreeMap<u16, Bundle> =
+                bundles.into_iter().map(|bundle| (bundle[0].to(), bundle)).collect();
+            for row in &self.rows {
+                if row.iter().all(|slot| by_result.contains_key(slot)) {
+                    groups.push(row.iter().filter_map(|slot| by_result.remove(slot)).collect());
+                }
+            }
+            let rest: Vec<Bundle> = by_result.into_values().collect();
+            groups.extend(rest.chunks(MOST).map(<[Bundle]>::to_vec));
+        }
+        for group in groups.iter().filter(|group: &&Vec<Bundle>| group.len() > 1) {
+            for i in 0..operands(&group[0]).len() {
+                let row: Vec<u16> = group.iter().map(|bundle| operands(bundle)[i]).collect();
+                let is_row = row.iter().collect::<HashSet<_>>().len() == row.len();
+                if is_row && self.known.insert(row.clone()) {
+                    self.rows.push(row);
+                }
+            }
+        }
+        groups
+    }
+}
+
 impl Plan {
     /// How many numbers the rows take, with room for so many coefficients, and the held values behind them.
     pub(super) fn numbers(&self, room: usize) -> usize {
@@ -124,7 +169,7 @@ impl Plan {
         for stretch in &program.stretches {
             bundles.extend(stretch.chains.iter().map(|&chain| vec![Work::Chain(chain)]));
             match stretch.last {
-                Some(step @ Step { node: Node::Cos(_) | Node::Slope(_), .. }) => {
+                Some(step @ Step { node: Node::Cos(_) | Node::CosOfTime(_) | Node::Slope(_), .. }) => {
                     bundles.last_mut().expect("the sine").push(Work::Step(step));
                 }
                 Some(step) => bundles.push(vec![Work::Step(step)]),
@@ -132,35 +177,35 @@ impl Plan {
             }
         }
         bundles.extend(program.copied.iter().map(|&(slot, n)| vec![Work::Chain(Chain::copy(slot, n))]));
-        // Operations of one level do not depend on each other.
-        let mut levels = std::collections::HashMap::new();
+        // Operations of one level do not depend on each other, and nothing of the same order on rates. Rates that are
+        // series come last.
+        let mut levels = HashMap::new();
         let mut by_level: Vec<Vec<Bundle>> = Vec::new();
+        let (mut rates, mut copies) = (Vec::new(), Vec::new());
         for bundle in bundles {
+            let first = bundle[0];
+            if first.is_rate() {
+                if first.is_long() { &mut rates } else { &mut copies }.push(bundle);
+                continue;
+            }
             let level =
                 operands(&bundle).iter().filter_map(|slot| levels.get(slot)).max().map_or(0, |l| l + 1);
-            let first = bundle[0];
-            if !first.is_rate() {
-                for slot in (first.to()..).take(first.results()) {
-                    levels.insert(slot, level);
-                }
+            for slot in (first.to()..).take(first.results()) {
+                levels.insert(slot, level);
             }
             by_level.resize_with(by_level.len().max(level + 1), Vec::new);
             by_level[level].push(bundle);
         }
+        let (linear, copies) = copies.into_iter().partition::<Vec<_>, _>(|bundle| operands(bundle).len() > 1);
+        rates.extend(linear);
+        by_level.push(rates);
+        // From the last level on, so that operations are side by side in the order in which others need them.
+        let mut wanted = Wanted::default();
+        let mut levels: Vec<_> = by_level.into_iter().rev().map(|level| wanted.side_by_side(level)).collect();
+        levels.reverse();
+        levels.push(wanted.side_by_side(copies));
         let mut plan = Plan::default();
-        for level in by_level {
-            let mut kinds: Vec<(Vec<Work>, Vec<Bundle>)> = Vec::new();
-            for bundle in level {
-                let kind: Vec<Work> = bundle.iter().map(|work| work.kind()).collect();
-                match kinds.iter_mut().find(|(other, _)| *other == kind) {
-                    Some((_, bundles)) => bundles.push(bundle),
-                    None => kinds.push((kind, vec![bundle])),
-                }
-            }
-            for (_, bundles) in kinds {
-                bundles.chunks(MOST).for_each(|bundles| plan.add(bundles));
-            }
-        }
+        levels.iter().flatten().for_each(|bundles| plan.add(bundles));
         plan.finish()
     }
 
@@ -176,9 +221,18 @@ impl Plan {
         let side_by_side = |of: &dyn Fn(&Bundle) -> u16| (0..lanes).map(|l| of(lane(l))).collect::<Vec<_>>();
         let tuples: Vec<Vec<u16>> =
             (0..operands(lane(0)).len()).map(|i| side_by_side(&|bundle| operands(bundle)[i])).collect();
-        let known = tuples.iter().all(|slots| self.row(slots).is_some());
         let first = bundles[0][0];
-        let pays = first.is_long() || known && matches!(first, Work::Chain(_));
+        let new = tuples.iter().enumerate();
+        let new = new.filter(|(i, slots)| self.row(slots).is_none() && !tuples[..*i].contains(slots)).count();
+        // Instructions: each operation has some. Each lane of a row needs two to be loaded and one to be stored.
+        let pays = match first {
+            _ if first.is_long() => true,
+            Work::Chain(chain) => {
+                let each = 4 + 3 * usize::from(chain.count) / 2;
+                bundles.len() * each > each + lanes * (2 * new + 1)
+            }
+            Work::Step(_) => false,
+        };
         if lanes == 1 || !pays {
             let all = bundles.iter().flatten();
             return self.tasks.extend(all.map(|&work| Task::Single(work)));
@@ -263,4 +317,39 @@ fn held_values(work: Work) -> Vec<u16> {
         h
     });
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::FormulaFamily;
+    use crate::tape::Tape;
+
+    /// In a chain of oscillators the series of four speeds are side by side, and so are the places, which others need.
+    #[test]
+    fn operations_are_side_by_side_as_they_are_needed() {
+        let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        let states = ["x1", "v1", "x2", "v2", "x3", "v3", "x4", "v4", "x5", "v5", "x6", "v6"];
+        let force = |i: usize, pull: &str| format!("-x{i}^3 - d*v{i} + k*({pull} - 2*x{i})");
+        let pulls = ["x2", "x1 + x3", "x2 + x4", "x3 + x5", "x4 + x6", "x5"];
+        let mut texts: Vec<String> = Vec::new();
+        for (i, pull) in (1..).zip(pulls) {
+            texts.extend([format!("v{i}"), force(i, pull)]);
+        }
+        let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+        let family = FormulaFamily::<12>::parse(&names(&states), &texts, &names(&["d", "k"]), &[]).unwrap();
+        let tape = Tape::record(&family, &[]).unwrap();
+        let plan = &tape.program.plan;
+        let rate = |task: &Task| match task {
+            Task::Group(_, 4, scattered) => {
+                scattered.iter().find(|(_, is_rate)| *is_rate).map(|&(row, _)| row)
+            }
+            _ => None,
+        };
+        let rates: Vec<_> = plan.tasks.iter().filter_map(rate).collect();
+        let slots: Vec<&[u16]> = rates.iter().map(|&row| &plan.rows[row].slots[..]).collect();
+        assert_eq!(slots, [[1, 3, 5, 7], [0, 2, 4, 6]]);
+        // These rows are computed, and never gathered.
+        assert!(!plan.tasks.iter().any(|task| matches!(task, Task::Gather(row) if rates.contains(row))));
+    }
 }

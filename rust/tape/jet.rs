@@ -5,7 +5,7 @@ use super::fuse::Program;
 use super::node::{INVERSE, hold};
 use super::specialised::Specialised;
 use super::{Invariant, Node, Tape, disk_series, dle_series};
-use crate::model::{Piece, Sides};
+use crate::model::{MAX_SURFACES, Piece, Sides, StepStart};
 use crate::scalar::{InstructionSet, Isa, Mask, Plain, Real, Scalar, Work, vector};
 use crate::unroll::unroll;
 
@@ -23,17 +23,20 @@ pub struct Jets<S: Scalar, const D: usize, const N: usize> {
     /// The same without derivatives, for the rates alone.
     values: Vec<[S::Real; 2]>,
     held_values: Vec<S::Real>,
+    /// The place of the values of a single plain trajectory: a step begins where the last one was compared with the law.
+    values_at: Option<StepStart<S::Real, D>>,
 }
 
 impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
+    const IS_SINGLE: bool = S::IS_PLAIN && S::Real::LANES == 1;
+
     /// Room for this tape, whose series are computed with these instructions.
     /// [`expand`](Jets::expand) allocates nothing.
     pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
         const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
         let zero = S::Real::zero();
         // Single trajectories have the rows of machine code behind the slots.
-        let is_single = S::IS_PLAIN && S::Real::LANES == 1;
-        let rows = if is_single { tape.program.plan.numbers(N).div_ceil(N) } else { 0 };
+        let rows = if Self::IS_SINGLE { tape.program.plan.numbers(N).div_ceil(N) } else { 0 };
         Self {
             isa,
             order: N - 1,
@@ -41,6 +44,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             held: vec![S::zero(); tape.held.len()],
             values: vec![[zero; 2]; tape.slots],
             held_values: vec![zero; tape.held.len()],
+            values_at: None,
         }
     }
 
@@ -56,6 +60,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
 
     /// Evaluates what does not change along a solution.
     pub fn hold(&mut self, tape: &Tape<D>, parameters: &[S], sides: &Sides<S>) {
+        self.values_at = None;
         hold(&tape.held, parameters, sides, &mut self.held);
         for i in 0..self.held.len() {
             self.held_values[i] = self.held[i].real();
@@ -65,6 +70,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// Uses these pieces of the inputs until the next call.
     #[inline(never)]
     pub fn set_inputs(&mut self, tape: &Tape<D>, piece: &dyn Fn(usize) -> Piece<S>) {
+        self.values_at = None;
         for (i, held) in tape.held.iter().enumerate() {
             // Its coefficients are behind it.
             if let Invariant::Input(k, 0) = *held {
@@ -90,7 +96,33 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     ) -> [S::Real; D] {
         let Self { isa, values, held_values, .. } = self;
         let rates = Rates { program: &tape.program, values, held: held_values, t, x, sides };
-        if const { S::Real::LANES > 1 } { S::Real::work(*isa, rates) } else { rates.run::<Plain>() }
+        if const { S::Real::LANES > 1 } {
+            return S::Real::work(*isa, rates);
+        }
+        let rates = rates.run::<Plain>();
+        if const { Self::IS_SINGLE } {
+            self.values_at = Some(StepStart { t, x: *x, sides: *sides });
+        }
+        rates
+    }
+
+    /// Takes order 0 from the values, if they are of this place.
+    #[inline(always)]
+    fn is_begun(&mut self, t: S::Real, x: &[S; D], sides: &Sides<S>) -> bool {
+        let Some(at) = &self.values_at else { return false };
+        let same = |a: S::Real, b: S::Real| a.lane(0).to_bits() == b.lane(0).to_bits();
+        let mut all = same(at.t, t);
+        unroll!(n in 0..D => { all &= same(at.x[n], x[n].real()); });
+        for j in 0..MAX_SURFACES {
+            all &= at.sides[j].lane(0) == sides[j].lane(0);
+        }
+        if all {
+            for (work, values) in self.work.iter_mut().zip(&self.values) {
+                work[0] = S::lift(values[0]);
+            }
+            unroll!(n in 0..D => { self.work[n][1] = S::lift(self.values[n][1]); });
+        }
+        all
     }
 
     /// Goes up to this order only, at least 4.
@@ -114,6 +146,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
     pub fn expand_here<V: InstructionSet>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
+        let is_started = const { Self::IS_SINGLE } && self.is_begun(t.real(), x, sides);
         let Self { isa, work, held, order, .. } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.
@@ -128,9 +161,11 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         {
             return disk_series::expand::<V, S, D, N>(work, order, (held, at), x, sides);
         }
-        unroll!(n in 0..D => { work[n][0] = x[n]; });
+        if !is_started {
+            unroll!(n in 0..D => { work[n][0] = x[n]; });
+        }
         let program = &tape.program;
-        S::Real::work(*isa, Interpretation { program, work, order, held, t, sides });
+        S::Real::work(*isa, Interpretation { program, work, order, held, t, sides, is_started });
     }
 
     /// True if the law has [levelled off](Tape::levels_off) to the last bit: its series then contains nothing of the
@@ -212,6 +247,8 @@ struct Interpretation<'a, S: Scalar, const N: usize> {
     held: &'a [S],
     t: S,
     sides: &'a Sides<S>,
+    /// True if order 0 is known.
+    is_started: bool,
 }
 
 impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
@@ -221,11 +258,11 @@ impl<S: Scalar, const N: usize> Work for Interpretation<'_, S, N> {
 
     #[inline(always)]
     fn run<V: InstructionSet>(self) {
-        let Self { program, work, order, held, t, sides } = self;
+        let Self { program, work, order, held, t, sides, is_started } = self;
         if const { S::Real::LANES > 1 } {
             // Packets are only fast with their own instructions.
             program.start(work, held, t, sides);
-        } else {
+        } else if !is_started {
             begin(program, work, held, t, sides);
         }
         // Machine code is made for the orders that are used, with the best instructions.
@@ -253,4 +290,87 @@ fn begin<S: Scalar, const N: usize>(
     sides: &Sides<S>,
 ) {
     program.start(work, held, t, sides);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::array::from_fn;
+
+    use super::*;
+    use crate::model::FormulaFamily;
+
+    fn tape(texts: [&str; 2]) -> Tape<2> {
+        let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        let family = FormulaFamily::parse(&names(&["x", "y"]), &texts, &names(&["k", "c"]), &[]).unwrap();
+        Tape::record(&family, &[]).unwrap()
+    }
+
+    /// The coefficients of `x' = sin(k t + c)` are those of the sine.
+    #[test]
+    fn sines_of_linear_functions_of_time() {
+        let counts = |texts| {
+            let tape = tape(texts);
+            let linear = tape.steps.iter().filter(|step| matches!(step.node, Node::SinOfTime(_))).count();
+            (linear, tape.steps.iter().filter(|step| matches!(step.node, Node::Sin(_))).count())
+        };
+        assert_eq!(counts(["sin(k*t + c)", "cos(c - t/k)*x"]), (2, 0));
+        assert_eq!(counts(["sin(t*t) + sin(k/t)", "sin(x + t) + cos(x*t)"]), (0, 4));
+
+        let tape = tape(["sin(k*t + c)", "cos(c - t/k)"]);
+        let mut jets = Jets::<f64, 2, 19>::new(&tape, Isa::best());
+        let (k, c, t) = (1.7, 0.4, 0.9);
+        jets.expand(&tape, &[k, c], t, &[0.0; 2], &[true; MAX_SURFACES]);
+        let mut factor = 1.0;
+        for order in 1..=18 {
+            let turns = (order - 1) as f64 * std::f64::consts::FRAC_PI_2;
+            factor /= order as f64;
+            let exact = [
+                factor * k.powi(order - 1) * (k * t + c + turns).sin(),
+                factor * (-1.0 / k).powi(order - 1) * (c - t / k + turns).cos(),
+            ];
+            for n in 0..2 {
+                let found: f64 = jets.coefficients()[n][order as usize];
+                assert!((found - exact[n]).abs() <= 1e-14 * factor * k.powi(order - 1), "{n} {order}");
+            }
+        }
+    }
+
+    /// A series that begins with the rates at its place has the bits of any other, and rates at another place are not used.
+    #[test]
+    fn rates_are_the_begin_of_a_series() {
+        let tape = tape(["y", "-sin(x)*k + abs(y)*c + cos(t)"]);
+        let (t, x) = (0.3, [0.8, -0.6]);
+        let sides = |upper| from_fn(|_| upper);
+        let series = |before: Option<(f64, [f64; 2], bool)>, upper| {
+            let mut jets = Jets::<f64, 2, 19>::new(&tape, Isa::best());
+            jets.hold(&tape, &[1.3, 0.2], &sides(upper));
+            if let Some((t, x, upper)) = before {
+                jets.rates(&tape, t, &x, &sides(upper));
+                // A mark of series that begin there.
+                for values in &mut jets.values {
+                    values[0] += 1.0;
+                }
+            }
+            jets.expand_here::<Plain>(&tape, t, &x, &sides(upper));
+            jets.coefficients().map(|c| c.map(f64::to_bits))
+        };
+        for upper in [true, false] {
+            let anew = series(None, upper);
+            assert_ne!(series(Some((t, x, upper)), upper), anew, "begun by the rates");
+            for other in
+                [(0.4, x, upper), (t, [0.8, 0.6], upper), (t, [f64::NAN, -0.6], upper), (t, x, !upper)]
+            {
+                assert_eq!(series(Some(other), upper), anew, "{other:?}");
+            }
+        }
+        let mut jets = Jets::<f64, 2, 19>::new(&tape, Isa::best());
+        jets.hold(&tape, &[1.3, 0.2], &sides(true));
+        jets.rates(&tape, t, &x, &sides(true));
+        jets.expand_here::<Plain>(&tape, t, &x, &sides(true));
+        assert_eq!(jets.coefficients().map(|c| c.map(f64::to_bits)), series(None, true));
+        jets.rates(&tape, t, &x, &sides(true));
+        jets.hold(&tape, &[2.3, 0.2], &sides(true));
+        jets.expand_here::<Plain>(&tape, t, &x, &sides(true));
+        assert_ne!(jets.coefficients().map(|c| c.map(f64::to_bits)), series(None, true), "other parameters");
+    }
 }

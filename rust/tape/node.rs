@@ -67,6 +67,10 @@ pub enum Node {
     Sin(u16),
     /// The cosine that belongs to this sine.
     Cos(u16),
+    /// The sine of a linear function of time, with the same slots: a product of series has one term.
+    SinOfTime(u16),
+    /// The cosine that belongs to this sine.
+    CosOfTime(u16),
     /// Its other slots are for its slope `1 - tanh^2` and the argument's derivative.
     Tanh(u16),
     /// The slope that belongs to this hyperbolic tangent.
@@ -88,9 +92,9 @@ impl Node {
     pub(super) fn slots(self) -> usize {
         match self {
             Node::Div(..) | Node::Over(..) | Node::Sqrt(_) | Node::Exp(_) => 2,
-            Node::Ln(_) | Node::Sin(_) | Node::Tanh(_) => 3,
+            Node::Ln(_) | Node::Sin(_) | Node::SinOfTime(_) | Node::Tanh(_) => 3,
             Node::Piece(..) => 5,
-            Node::Cos(_) | Node::Slope(_) => 0,
+            Node::Cos(_) | Node::CosOfTime(_) | Node::Slope(_) => 0,
             _ => 1,
         }
     }
@@ -214,7 +218,7 @@ impl Step {
                 to[0][0] = Function::Ln.of(of!(a));
                 return;
             }
-            Node::Sin(a) => {
+            Node::Sin(a) | Node::SinOfTime(a) => {
                 to[1][0] = Function::Cos.of(of!(a));
                 to[0][0] = Function::Sin.of(of!(a));
                 return;
@@ -225,7 +229,7 @@ impl Step {
                 return;
             }
             // Done with the sine and the tangent.
-            Node::Cos(_) | Node::Slope(_) => return,
+            Node::Cos(_) | Node::CosOfTime(_) | Node::Slope(_) => return,
         };
     }
 
@@ -295,6 +299,13 @@ impl Step {
                 sum.fused(slope, of!(to + 1, 0)).scale(inverse)
             }
             Node::Cos(sine) => sum.fused(of!(sine + 2, k), of!(sine, 0)).scale(-inverse),
+            Node::SinOfTime(a) => {
+                if k == 1 {
+                    of!(to + 2, 1) = of!(a, 1);
+                }
+                (of!(to + 2, 1) * of!(to + 1, k - 1)).scale(inverse)
+            }
+            Node::CosOfTime(sine) => (of!(sine + 2, 1) * of!(sine, k - 1)).scale(-inverse),
             Node::Slope(tanh) => -sum.fused(of!(tanh, 0) + of!(tanh, 0), of!(tanh, k)),
             Node::Select(j, a, b) => S::select(sides[usize::from(j)], of!(a, k), of!(b, k)),
             _ => unreachable!("products and linear steps are in chains"),

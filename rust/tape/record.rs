@@ -1,7 +1,9 @@
 //! From a model to its tape.
 
+use std::any::Any;
 use std::array::from_fn;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use thiserror::Error;
 
@@ -9,6 +11,7 @@ use super::fuse::Program;
 use super::specialised::Specialised;
 use super::symbol::{self, Function, Knots, Made, Recording, SurfaceSideRef, Symbol};
 use super::{Invariant, Node, Step, Tape};
+use crate::latest::Latest;
 use crate::model::{Family, MAX_SURFACES, Sides, System};
 use crate::scalar::Scalar;
 
@@ -16,6 +19,12 @@ use crate::scalar::Scalar;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the model's law has a comparison or an arc tangent, which no power series follows here")]
 pub struct Unrecordable;
+
+/// The tapes of the latest laws, each by the law's number and the bits of its fixed parameters.
+static LATEST: Latest<(u64, Vec<Option<u64>>), AnyTape> = Latest::new();
+
+/// A [`Tape`] of any number of states.
+type AnyTape = Arc<dyn Any + Send + Sync>;
 
 impl<const D: usize> Tape<D> {
     /// Records the rates of the family's systems. Parameters whose value is `fixed` become constants, and terms that
@@ -26,6 +35,14 @@ impl<const D: usize> Tape<D> {
     /// # Errors
     /// The model looks at the value of a number, which a recording does not have.
     pub fn record<F: Family<D>>(family: &F, fixed: &[Option<f64>]) -> Result<Self, Unrecordable> {
+        let Some(law) = family.law() else { return Self::record_anew(family, fixed) };
+        let key = (law, fixed.iter().map(|value| value.map(f64::to_bits)).collect());
+        let make = || Self::record_anew(family, fixed).map(|tape| Arc::new(tape) as AnyTape);
+        let tape = LATEST.get(key, make)?;
+        Ok(tape.downcast_ref::<Self>().expect("a law has one number of states").clone())
+    }
+
+    fn record_anew<F: Family<D>>(family: &F, fixed: &[Option<f64>]) -> Result<Self, Unrecordable> {
         let open = Self::recorded(family, &[])?;
         if fixed.iter().all(Option::is_none) {
             return Ok(open);
@@ -230,14 +247,29 @@ impl<'a> Lowering<'a> {
         self.push(node)
     }
 
+    /// Returns true for a linear function of time, whose series ends with order 1.
+    fn is_linear(&self, s: Symbol) -> bool {
+        match self.made(s) {
+            _ if !self.varies(s) => true,
+            Made::Time => true,
+            Made::Neg(a) => self.is_linear(a),
+            Made::Add(a, b) | Made::Sub(a, b) => self.is_linear(a) && self.is_linear(b),
+            Made::Mul(a, b) => (!self.varies(a) || !self.varies(b)) && self.is_linear(a) && self.is_linear(b),
+            Made::Div(a, b) => !self.varies(b) && self.is_linear(a),
+            _ => false,
+        }
+    }
+
     /// The slot of the sine's series; that of the cosine is behind it.
     fn circle(&mut self, angle: Symbol) -> u16 {
         if let Some(&slot) = self.circle_of.get(&angle) {
             return slot;
         }
-        let node = Node::Sin(self.slot(angle));
-        let slot = self.push(node);
-        self.steps.push(Step { node: Node::Cos(slot), to: slot + 1 });
+        let a = self.slot(angle);
+        let is_linear = self.is_linear(angle);
+        let slot = self.push(if is_linear { Node::SinOfTime(a) } else { Node::Sin(a) });
+        let cosine = if is_linear { Node::CosOfTime(slot) } else { Node::Cos(slot) };
+        self.steps.push(Step { node: cosine, to: slot + 1 });
         self.circle_of.insert(angle, slot);
         slot
     }

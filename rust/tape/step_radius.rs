@@ -1,8 +1,6 @@
 //! How far a Taylor polynomial reaches, and its values.
 
-use std::convert::identity;
-
-use super::Jets;
+use super::{HIGH, Jets, LOW};
 use crate::scalar::elementary::power_rough;
 use crate::scalar::{InstructionSet, Mask, Packet, Real, Scalar, Work, vector};
 use crate::tolerance::ErrorNorm;
@@ -25,14 +23,20 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// The rates of the polynomial at a distance `dt`, without derivatives, with the caller's instructions.
     #[inline(always)]
     pub fn slope_here(&self, dt: S::Real) -> [S::Real; D] {
-        vector!(S::Real, D; n => {
-            let c = &self.coefficients()[n];
-            let mut sum = S::Real::zero();
-            for k in (1..=self.order()).rev() {
-                sum = sum * dt + c[k].real().scale(k as f64);
-            }
-            sum
-        })
+        // As in a step, the usual orders are known to the compiler.
+        match self.order() {
+            order if const { !S::IS_PLAIN } => self.slope_of(order, dt),
+            LOW => self.slope_of(LOW, dt),
+            HIGH => self.slope_of(HIGH, dt),
+            order => self.slope_of(order, dt),
+        }
+    }
+
+    #[inline(always)]
+    fn slope_of(&self, order: usize, dt: S::Real) -> [S::Real; D] {
+        let series = self.coefficients();
+        let rate = |k: usize, c: S| c.real().scale(WEIGHTS[k]);
+        vector!(S::Real, D; n => value(&series[n][1..=order.min(N - 1)], dt, rate))
     }
 
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
@@ -40,12 +44,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
         let (series, terms) = (self.coefficients(), order.min(N - 1) + 1);
         if const { size_of::<S>() == size_of::<S::Real>() } {
-            return vector!(S, D; n => value(&series[n][..terms], dt, identity));
+            return vector!(S, D; n => value(&series[n][..terms], dt, same));
         }
         // Derivatives fill the registers: one component after the other.
         let mut x = [S::zero(); D];
         for n in 0..D {
-            x[n] = value(&series[n][..terms], dt, identity);
+            x[n] = value(&series[n][..terms], dt, same);
         }
         x
     }
@@ -63,12 +67,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             let mut x = [S::Real::zero(); D];
             for n in 0..D {
                 if of[n] {
-                    x[n] = value(self.terms(n), dt, S::real);
+                    x[n] = value(self.terms(n), dt, |_, c| c.real());
                 }
             }
             return x;
         }
-        vector!(S::Real, D; n => if of[n] { value(self.terms(n), dt, S::real) } else { S::Real::zero() })
+        vector!(S::Real, D; n => if of[n] { value(self.terms(n), dt, |_, c| c.real()) } else { S::Real::zero() })
     }
 
     /// How far the solution may be followed by the series up to this order: the last two terms are then as small
@@ -124,9 +128,27 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     }
 }
 
-/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type.
+/// The weights of a series' coefficients from order 1 on in the series of its derivative.
+const WEIGHTS: [f64; 24] = {
+    let mut weights = [0.0; 24];
+    let mut k = 0;
+    while k < 24 {
+        weights[k] = (k + 1) as f64;
+        k += 1;
+    }
+    weights
+};
+
+/// A coefficient as it is.
 #[inline(always)]
-fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -> T {
+fn same<S>(_k: usize, c: S) -> S {
+    c
+}
+
+/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type by their
+/// places.
+#[inline(always)]
+fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(usize, S) -> T) -> T {
     let dt2 = dt * dt;
     let dt4 = dt2 * dt2;
     // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
@@ -137,17 +159,18 @@ fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -
         (groups, highest) = (lower, last);
     }
     let mut sums = [T::zero(); 4];
-    for (sum, &c) in sums.iter_mut().zip(highest) {
-        *sum = lift(c);
+    let places = 1 + 4 * groups.len();
+    for (r, (sum, &c)) in sums.iter_mut().zip(highest).enumerate() {
+        *sum = lift(places + r, c);
     }
-    for group in groups.iter().rev() {
+    for (i, group) in groups.iter().enumerate().rev() {
         for r in 0..4 {
-            sums[r] = lift(group[r]).fused_times(sums[r], dt4);
+            sums[r] = lift(1 + 4 * i + r, group[r]).fused_times(sums[r], dt4);
         }
     }
     // The state itself is added last, which rounds once.
     let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
-    lift(series[0]).fused_times(low.fused_times(high, dt2), dt)
+    lift(0, series[0]).fused_times(low.fused_times(high, dt2), dt)
 }
 
 /// The number without derivatives, in every lane.
@@ -187,7 +210,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
                 if of[n] {
-                    let found = value(jets.terms(n), places, broadcast::<S, P, V>);
+                    let found = value(jets.terms(n), places, |_, c| broadcast::<S, P, V>(c));
                     for i in 0..P {
                         states[i][n] = S::Real::constant(found.lane(i));
                     }
