@@ -393,7 +393,7 @@ def _odd_blocks(
 
 
 def _confirmed(guess: Array, sigma: Array, odd: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Drop the frames that lie on the curve through the good ones: an outlier beside them distorted a cubic."""
+    """Drop frames that lie on the curve through the others; an outlier beside them distorted their cubic."""
     # Without this, four good frames beside some outliers of a disk's film lose their weight.
     bend = (
         np.abs(np.diff(guess, 4, axis=0)) / 6
