@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 from scipy.ndimage import maximum_filter1d
@@ -43,8 +42,6 @@ _SHORT = 30  # A record with fewer frames hardly shows its noise.
 _END, _JUMP = 8, 30.0  # Frames at an end of a run; no motion jumps there by so many of their steps.
 _LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
 _OF_FRAMES = ("t", "seen", "sigma", "rho", "states", "odd", "row", "film")  # arrays with a row for each frame
-_BLOCK = 4  # Frames of the longest block of outliers.
-_RARE = 0.02  # Share of outliers up to which they are rare.
 _CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
 
 
@@ -348,74 +345,35 @@ def _fill(
 
 
 def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Detect frames far from the cubic through the two before and after, in any channel (noise `sigma`).
-
-    The same holds for short blocks of frames if outliers are rare; else they may be spikes of the motion.
-    """
-    ends = _odd_ends(guess, sigma, linked)
-    blocks = ends
-    for length in range(_BLOCK, 0, -1):
-        blocks = _odd_blocks(guess, sigma, linked, blocks, length)
-    blocks = _confirmed(guess, sigma, blocks)
-    is_rare = np.count_nonzero(blocks) <= max(_RARE * len(guess), _BLOCK)
-    return blocks if is_rare else _odd_blocks(guess, sigma, linked, ends, 1)
-
-
-def _odd_blocks(
-    guess: Array, sigma: Array, linked: NDArray[np.bool_], odd: NDArray[np.bool_], length: int
-) -> NDArray[np.bool_]:
-    """Detect blocks of so many frames that are all far from the cubic through their surroundings."""
-    width = length + 4
-    if len(guess) < width or not (whole := sliding_window_view(linked, width - 1).all(axis=1)).any():
+    """Detect frames far from the cubic through the two before and after, in any channel (noise `sigma`)."""
+    n = len(guess)
+    odd = _odd_ends(guess, sigma, linked)
+    inside = np.zeros(n, dtype=bool)
+    inside[2:-2] = linked[:-3] & linked[1:-2] & linked[2:-1] & linked[3:]
+    if not inside.any():
         return odd
-    odd, filled = odd.copy(), guess.copy()
-    for _ in range(_CLEANED):
-        for channel in filled.T if odd.any() else ():
-            channel[odd] = _between(odd, channel)
-        seen = sliding_window_view(filled, width, axis=0)
-        off = np.abs(seen[..., 2:-2] - seen[..., [0, 1, -2, -1]] @ _cubic(length)).min(axis=-1)
-        if length > 1:  # it begins and ends with a jump
-            for bend in (seen[..., :3], seen[..., -3:]):
-                off = np.minimum(off, np.abs(np.diff(bend, 2)[..., 0]))
-        has_odd = np.asarray(sliding_window_view(odd, width)[:, 2:-2].any(axis=1))
-        typical = np.maximum(np.median(off[whole & ~has_odd], axis=0), sigma)
-        # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
-        # steps.
-        step = np.maximum(np.abs(seen[..., 1] - seen[..., 0]), np.abs(seen[..., -1] - seen[..., -2]))
-        off[(off < _LEAP * step) | (~whole | has_odd)[:, None]] = 0.0
-        # Only the worst of adjacent outliers is removed in a round: it distorts the cubics of the others.
-        far = (off / typical).max(axis=1)
-        begins = np.flatnonzero((far > _ODD) & (far >= maximum_filter1d(far, width)))
-        if not len(begins):
-            break
-        odd[begins[:, None] + np.arange(2, 2 + length)] = True
-    return odd
-
-
-def _confirmed(guess: Array, sigma: Array, odd: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Drop frames that lie on the curve through the others; an outlier beside them distorted their cubic."""
-    # Without this, four good frames beside some outliers of a disk's film lose their weight.
-    bend = (
-        np.abs(np.diff(guess, 4, axis=0)) / 6
-    )  # distance from the cubic through two frames before and after
-    typical = np.maximum(np.median(bend, axis=0), sigma) if len(bend) else sigma
+    filled = guess.copy()
+    for channel in filled.T:
+        channel[odd] = _between(odd, channel)
     for _ in range(_CLEANED):
         off = np.zeros_like(guess)
-        for channel, column in zip(off.T, guess.T, strict=True) if odd.any() else ():
-            channel[odd] = column[odd] - _between(odd, column)
-        good = odd & (np.abs(off) < _ODD * typical).all(axis=1)
-        if not good.any():
+        cubic = (4 * (filled[1:-3] + filled[3:-1]) - filled[:-4] - filled[4:]) / 6
+        off[2:-2] = np.abs(filled[2:-2] - cubic)
+        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
+        # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
+        # steps.
+        step = np.abs(np.diff(filled, axis=0))
+        off[2:-2][off[2:-2] < _LEAP * np.maximum(step[:-3], step[3:])] = 0.0
+        off[~inside | odd] = 0.0
+        # Only the worst of adjacent outliers is removed in a round: it distorts the cubics of the others.
+        far = (off / typical).max(axis=1)
+        is_odd = (far > _ODD) & (far >= maximum_filter1d(far, 5))
+        if not is_odd.any():
             break
-        odd = odd & ~good
+        odd |= is_odd
+        for channel in filled.T:
+            channel[odd] = _between(odd, channel)
     return odd
-
-
-def _cubic(length: int) -> Array:
-    """Return the weights of the cubic through the frames around a block, at its frames, (4, length)."""
-    places = np.array([-2.0, -1.0, length, length + 1.0])
-    inside = np.arange(length)
-    result: Array = np.linalg.solve(np.vander(places, 4).T, np.vander(inside, 4).T)
-    return result
 
 
 def _odd_ends(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
