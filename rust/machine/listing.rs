@@ -2,14 +2,15 @@
 
 use std::collections::HashMap;
 
+use super::allocate::allocate;
 use crate::scalar::Isa;
 
-/// A register, by its number below 16.
+/// A register, by its number below 16; AVX-512 has 32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register(pub u8);
 
 /// An array that code reads, or writes if it is `Work`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Array {
     Work,
     Held,
@@ -20,7 +21,7 @@ pub enum Array {
 }
 
 /// An element of an array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Place(pub Array, pub usize);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,6 +191,20 @@ impl Listing {
     /// Ends a function.
     pub fn end(&mut self) {
         self.push(Line::End);
+    }
+
+    /// Lets operations of packets find their operands in registers. Elements of the work from `results` on are not needed
+    /// after a function.
+    pub fn allocate(&mut self, results: usize) {
+        assert!(self.lanes > 1, "operations of one width");
+        let registers = if self.isa == Isa::Avx512 { 32 } else { 16 };
+        let mut lines = Vec::with_capacity(self.lines.len());
+        for function in self.lines.split_inclusive(|line| line.1 == Line::End) {
+            let body: Vec<_> = function.iter().map(|line| line.1).filter(|line| *line != Line::End).collect();
+            let body = allocate(&body, registers, results).unwrap_or(body);
+            lines.extend(body.into_iter().chain([Line::End]).map(|line| (self.width, line)));
+        }
+        self.lines = lines;
     }
 
     fn push(&mut self, line: Line) {

@@ -4,6 +4,7 @@
 //! operations in the same order give the same bits. Without the feature `machine-code`, and on machines without AVX2,
 //! [`Code::new`] returns `None`, and the operations are interpreted.
 
+mod allocate;
 mod codes;
 #[cfg(all(feature = "machine-code", target_arch = "x86_64"))]
 mod encode;

@@ -54,6 +54,10 @@ pub(super) fn series(program: &Program, isa: Isa, lanes: usize, room: usize, ord
         }
     }
     code.list.end();
+    if lanes > 1 {
+        // The other series are only steps on the way.
+        code.list.allocate(program.components() * room);
+    }
     Code::new(code.list)
 }
 
@@ -106,6 +110,9 @@ pub(super) fn start(program: &Program, isa: Isa, lanes: usize, room: usize) -> O
         code.chain(&Chain::copy(slot, n));
     }
     code.list.end();
+    if lanes > 1 {
+        code.list.allocate(usize::MAX);
+    }
     Some(Start { code: Code::new(code.list)?, interpreted })
 }
 

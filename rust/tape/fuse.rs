@@ -226,6 +226,12 @@ impl Program {
         let program = Self { stretches, copied, slots, ..Self::default() };
         machine::shared(&LATEST, Self { plan: Plan::of(&program), ..program })
     }
+
+    /// How many components the state has: each has a rate.
+    pub(super) fn components(&self) -> usize {
+        let chains = self.stretches.iter().flat_map(|stretch| &stretch.chains);
+        chains.filter(|chain| chain.is_rate).count() + self.copied.len()
+    }
 }
 
 /// Steps on the way to a program.

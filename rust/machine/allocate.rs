@@ -1,0 +1,329 @@
+//! Registers for listings of packets: values stay in registers as long as these suffice.
+//!
+//! A listing loads each operand where it needs it, and stores each result. Most of the loads are those of values that were in a
+//! register shortly before. All uses are known in advance, so the value whose next use is the furthest gives way
+//! (L. A. Belady, IBM Systems Journal 5 (1966) 78). The operations and their order do not change.
+
+use std::collections::HashMap;
+
+use super::listing::{Array, Line, Operand, Operation, Place, Register};
+
+type Value = usize;
+
+/// The result of an operation, or what a place contains.
+#[derive(Debug, Default)]
+struct Known {
+    /// Its place in memory.
+    home: Option<Place>,
+    /// True if it is there already.
+    saved: bool,
+    /// The operations that need it, the last one first.
+    uses: Vec<usize>,
+    register: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Action {
+    /// The operation, its result, the sum that it adds to, and its two operands.
+    Apply(Operation, Value, Option<Value>, Option<Value>, Value),
+    Store(Place, Value),
+}
+
+/// The same operations with as many registers; `None` if a place has several values. Elements of the work from
+/// `results` on are not needed afterwards.
+pub(super) fn allocate(lines: &[Line], registers: usize, results: usize) -> Option<Vec<Line>> {
+    let (known, actions) = values(lines, results)?;
+    let mut room = Room { known, held: vec![None; registers], lines: Vec::with_capacity(lines.len()) };
+    for action in actions {
+        room.perform(action);
+    }
+    Some(room.lines)
+}
+
+/// The values of a list of operations and what is done with them.
+fn values(lines: &[Line], results: usize) -> Option<(Vec<Known>, Vec<Action>)> {
+    let (mut known, mut actions) = (Vec::<Known>::new(), Vec::with_capacity(lines.len()));
+    let (mut in_place, mut in_register) = (HashMap::<Place, Value>::new(), HashMap::<u8, Value>::new());
+    for &line in lines {
+        let mut of = |operand, known: &mut Vec<Known>| match operand {
+            Operand::Register(register) => in_register.get(&register.0).copied(),
+            Operand::Place(place) => Some(*in_place.entry(place).or_insert_with(|| {
+                known.push(Known { home: Some(place), saved: true, ..Known::default() });
+                known.len() - 1
+            })),
+        };
+        match line {
+            Line::Load(to, from) => {
+                let value = of(from, &mut known)?;
+                in_register.insert(to.0, value);
+            }
+            Line::Apply(operation, to, a, b) => {
+                let b = of(b, &mut known)?;
+                let a = if operation == Operation::Root { None } else { Some(of(a.into(), &mut known)?) };
+                let sum = match operation {
+                    Operation::Fused => Some(of(to.into(), &mut known)?),
+                    _ => None,
+                };
+                known.push(Known::default());
+                let result = known.len() - 1;
+                actions.push(Action::Apply(operation, result, sum, a, b));
+                in_register.insert(to.0, result);
+            }
+            Line::Store(place, from) => {
+                let value = of(from.into(), &mut known)?;
+                if in_place.insert(place, value).is_some() {
+                    return None;
+                }
+                known[value].home.get_or_insert(place);
+                if place.1 < results {
+                    actions.push(Action::Store(place, value));
+                }
+            }
+            _ => return None,
+        }
+    }
+    for (i, &action) in actions.iter().enumerate().rev() {
+        match action {
+            Action::Store(_, value) => known[value].uses.push(i),
+            Action::Apply(_, _, sum, a, b) => {
+                for value in [sum, a, Some(b)].into_iter().flatten() {
+                    known[value].uses.push(i);
+                }
+            }
+        }
+    }
+    Some((known, actions))
+}
+
+/// The registers and what they contain.
+struct Room {
+    known: Vec<Known>,
+    held: Vec<Option<Value>>,
+    lines: Vec<Line>,
+}
+
+impl Room {
+    fn perform(&mut self, action: Action) {
+        match action {
+            Action::Store(place, value) => {
+                let own = &self.known[value];
+                if !(own.saved && own.home == Some(place)) {
+                    let from = self.loaded(value, &[value]);
+                    self.lines.push(Line::Store(place, name(from)));
+                    self.known[value].saved |= self.known[value].home == Some(place);
+                }
+                self.used(value);
+            }
+            Action::Apply(operation, result, sum, a, b) => self.apply(operation, result, sum, (a, b)),
+        }
+    }
+
+    fn apply(
+        &mut self,
+        operation: Operation,
+        result: Value,
+        sum: Option<Value>,
+        (mut a, mut b): (Option<Value>, Value),
+    ) {
+        use Operation::{Add, And, Fused, Mul, Or, Xor};
+        if let Some(first) = a
+            && matches!(operation, Add | Mul | Fused | And | Or | Xor)
+            && self.known[first].register.is_none()
+            && self.known[b].register.is_some()
+        {
+            (a, b) = (Some(b), first);
+        }
+        let mut needed = vec![b];
+        needed.extend(sum.into_iter().chain(a));
+        let sum_in = sum.map(|sum| self.loaded(sum, &needed));
+        let a_in = a.map(|a| self.loaded(a, &needed));
+        let b_in = if self.is_left_in_memory(b, &needed) {
+            Operand::Place(self.known[b].home.expect("a place"))
+        } else {
+            name(self.loaded(b, &needed)).into()
+        };
+        // A sum that is needed again is copied, while its factors are where they are.
+        let copied = sum.filter(|&sum| self.known[sum].uses.len() > uses_of(sum, &needed)).map(|_| {
+            let to = self.free(&needed);
+            self.lines.push(Line::Load(name(to), name(sum_in.expect("a sum")).into()));
+            to
+        });
+        needed.iter().for_each(|&value| self.used(value));
+        let to = copied.or(sum_in).unwrap_or_else(|| self.free(&needed));
+        self.lines.push(Line::Apply(operation, name(to), name(a_in.unwrap_or(to)), b_in));
+        self.put(result, to);
+        if self.known[result].uses.is_empty() {
+            self.drop(result);
+        }
+    }
+
+    /// Returns true if an operand is taken from memory because no register is worth it.
+    fn is_left_in_memory(&self, value: Value, needed: &[Value]) -> bool {
+        let own = &self.known[value];
+        if own.register.is_some() || !own.saved || own.home.is_none_or(|place| place.0 == Array::Constants) {
+            return false;
+        }
+        // This use is the last but those before it.
+        match own.uses.iter().rev().nth(1) {
+            None => true,
+            Some(&next) => {
+                !self.held.contains(&None)
+                    && self.furthest(needed).is_none_or(|other| self.next_use(other) <= next)
+            }
+        }
+    }
+
+    fn next_use(&self, value: Value) -> usize {
+        self.known[value].uses.last().copied().unwrap_or(usize::MAX)
+    }
+
+    /// The value in a register that gives way.
+    fn furthest(&self, needed: &[Value]) -> Option<Value> {
+        let values = self.held.iter().flatten().copied();
+        values
+            .filter(|value| !needed.contains(value) && self.known[*value].home.is_some())
+            .max_by_key(|&value| self.next_use(value))
+    }
+
+    /// A register that is free now.
+    fn free(&mut self, needed: &[Value]) -> usize {
+        if let Some(register) = self.held.iter().position(Option::is_none) {
+            return register;
+        }
+        let value = self.furthest(needed).expect("more registers than values under way");
+        let own = &mut self.known[value];
+        let register = own.register.expect("a register");
+        if !own.saved {
+            own.saved = true;
+            self.lines.push(Line::Store(own.home.expect("a place"), name(register)));
+        }
+        self.drop(value);
+        register
+    }
+
+    /// The register of a value, which is loaded if it is in none.
+    fn loaded(&mut self, value: Value, needed: &[Value]) -> usize {
+        if let Some(register) = self.known[value].register {
+            return register;
+        }
+        let register = self.free(needed);
+        let home = self.known[value].home.expect("a value that was given up has a place");
+        self.lines.push(Line::Load(name(register), home.into()));
+        self.put(value, register);
+        register
+    }
+
+    fn put(&mut self, value: Value, register: usize) {
+        self.known[value].register = Some(register);
+        self.held[register] = Some(value);
+    }
+
+    fn drop(&mut self, value: Value) {
+        if let Some(register) = self.known[value].register.take() {
+            self.held[register] = None;
+        }
+    }
+
+    /// Counts a use; a value without another one gives up its register.
+    fn used(&mut self, value: Value) {
+        self.known[value].uses.pop();
+        if self.known[value].uses.is_empty() {
+            self.drop(value);
+        }
+    }
+}
+
+/// How often the operands have this value.
+fn uses_of(value: Value, operands: &[Value]) -> usize {
+    operands.iter().filter(|&&other| other == value).count()
+}
+
+fn name(register: usize) -> Register {
+    Register(u8::try_from(register).expect("few registers"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A machine that does what a listing says; the work begins behind ten elements of each other array.
+    fn run(lines: &[Line], registers: usize, work: usize) -> Vec<f64> {
+        let mut memory: Vec<f64> = (0..work).map(|i| (i as f64 * 0.7).sin() + 0.1).collect();
+        let mut held = vec![f64::NAN; registers];
+        for &line in lines {
+            let of = |operand, memory: &[f64], held: &[f64]| match operand {
+                Operand::Register(Register(i)) => held[usize::from(i)],
+                Operand::Place(Place(Array::Work, at)) => memory[at],
+                Operand::Place(Place(_, at)) => 0.3 - at as f64,
+            };
+            match line {
+                Line::Load(to, from) => held[usize::from(to.0)] = of(from, &memory, &held),
+                Line::Store(place, from) => memory[place.1] = held[usize::from(from.0)],
+                Line::Apply(operation, to, a, b) => {
+                    let (a, b) = (held[usize::from(a.0)], of(b, &memory, &held));
+                    let to = &mut held[usize::from(to.0)];
+                    *to = match operation {
+                        Operation::Add => a + b,
+                        Operation::Sub => a - b,
+                        Operation::Mul => a * b,
+                        Operation::Fused => a.mul_add(b, *to),
+                        Operation::Root => b.abs().sqrt(),
+                        _ => unreachable!("not listed here"),
+                    };
+                }
+                _ => unreachable!("not for packets"),
+            }
+        }
+        memory
+    }
+
+    /// A list of operations by four registers: each stores its result, and loads earlier results.
+    fn listed(seed: u64, length: usize) -> Vec<Line> {
+        let mut state = seed;
+        let mut below = |n: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % n
+        };
+        let mut lines: Vec<_> = (0..4).map(|i| Line::Load(name(i), Place(Array::Work, i).into())).collect();
+        for i in 10..length {
+            let place = |at| Place([Array::Work, Array::Work, Array::Held][at % 3], at).into();
+            let to = below(4);
+            lines.push(Line::Load(name(below(4)), place(below(i))));
+            let b = if below(2) == 0 { place(below(i)) } else { name(below(4)).into() };
+            use Operation::{Add, Fused, Mul, Root, Sub};
+            lines.push(Line::Apply(
+                [Add, Sub, Mul, Fused, Fused, Root][below(6)],
+                name(to),
+                name(below(4)),
+                b,
+            ));
+            // Powers would overflow.
+            lines.push(Line::Apply(Operation::Mul, name(to), name(to), Place(Array::Constants, 0).into()));
+            lines.push(Line::Store(Place(Array::Work, i), name(to)));
+        }
+        lines
+    }
+
+    /// As many values as there are pass through eight registers, and none is lost.
+    #[test]
+    fn values_in_registers_are_those_in_memory() {
+        for seed in 0..60 {
+            let (length, results) = (120, [0, 40, 120][seed % 3]);
+            let lines = listed(seed as u64, length);
+            let allocated = allocate(&lines, 8, results).unwrap();
+            let [before, after] = [&lines, &allocated].map(|lines| run(lines, 8, length));
+            let bits = |all: &[f64]| all[..results].iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&before), bits(&after), "seed {seed}");
+            let loads = |lines: &[Line]| lines.iter().filter(|line| matches!(line, Line::Load(..))).count();
+            assert!(loads(&allocated) < loads(&lines));
+        }
+    }
+
+    /// A place that changes is not followed: the list stays as it is.
+    #[test]
+    fn places_have_one_value() {
+        let (place, register) = (Place(Array::Work, 3), name(0));
+        let lines = [Line::Load(register, place.into()), Line::Store(place, register)];
+        assert!(allocate(&lines, 16, 9).is_none());
+    }
+}
