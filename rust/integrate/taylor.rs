@@ -51,72 +51,83 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// levelled off entirely, the polynomial may be wrong on the way only, and so it may be in a law with splines.
     #[inline(never)]
     fn obey(&mut self, at: &StepStart<S, D>, norm: &impl ErrorNorm<S, D>, trial: &mut Trial<S, D>) {
-        let from = vector!(S::Real, D; n => at.x[n].real());
-        let flat = if self.tape.levels_off() { self.jets.flat(self.tape) } else { S::mask(false) };
-        let pieces = self.tape.is_in_pieces();
-        let mut bad = S::mask(false);
+        let (pieces, levels_off) = (self.tape.is_in_pieces(), self.tape.levels_off());
+        let flat = if levels_off { self.jets.flat(self.tape) } else { S::mask(false) };
         for halvings in 0..=MOST_HALVINGS {
-            let Trial { size, error, .. } = *trial;
-            let isa = self.jets.isa();
-            let end = vector!(S::Real, D; n => trial.x[n].real());
-            let mut strays = |part: f64| {
-                let dt = size.scale(part);
-                let x = if part == 1.0 { end } else { self.real_at(dt, &[true; D]) };
-                let strays = Strays { method: &mut *self, at, from: &from, x: &x, size, error, dt, norm };
-                // Worth a copy for each instruction set where all lanes and states are side by side.
-                if const { S::IS_PLAIN || S::Real::LANES > 1 } {
-                    S::Real::work(isa, strays)
-                } else {
-                    strays.run::<Plain>()
-                }
-            };
-            bad = strays(1.0);
+            let (mut bad, mut any) = self.strays(at, norm, trial, 1.0);
             // A coordinate may leave a spline's cell and return to it.
             for &part in if pieces { &EIGHTHS[..7] } else { &[] } {
-                bad = bad.or(strays(part));
+                let there = self.strays(at, norm, trial, part);
+                (bad, any) = (bad.or(there.0), any | there.1);
             }
-            if flat.any() {
+            if levels_off && flat.any() {
                 for part in [0.25, 0.5, 0.75] {
-                    bad = bad.or(flat.and(strays(part)));
+                    bad = bad.or(flat.and(self.strays(at, norm, trial, part).0));
                 }
+                any = bad.any();
             }
-            if !bad.any() {
+            if !any {
                 return;
             }
             if halvings == MOST_HALVINGS {
-                break;
+                trial.error = S::Real::select(bad, S::Real::constant(f64::NAN), trial.error);
+                return;
             }
-            trial.size = S::Real::select(bad, size.scale(0.5), size);
+            trial.size = S::Real::select(bad, trial.size.scale(0.5), trial.size);
             trial.x = self.jets.at(trial.size);
         }
-        trial.error = S::Real::select(bad, S::Real::constant(f64::NAN), trial.error);
+    }
+
+    /// Lanes where the polynomial does not obey the law at this part of the trial, and whether there are any.
+    fn strays(
+        &mut self,
+        at: &StepStart<S, D>,
+        norm: &impl ErrorNorm<S, D>,
+        trial: &Trial<S, D>,
+        part: f64,
+    ) -> (S::Mask, bool) {
+        let between = (part < 1.0).then(|| self.real_at(trial.size.scale(part), &[true; D]));
+        let isa = self.jets.isa();
+        let strays = Strays { method: self, at, trial, part, between: between.as_ref(), norm };
+        // Worth a copy for each instruction set where all lanes and states are side by side.
+        if const { S::IS_PLAIN || S::Real::LANES > 1 } {
+            S::Real::work(isa, strays)
+        } else {
+            strays.run::<Plain>()
+        }
     }
 }
 
-/// The comparison of the polynomial's rates with those of the law, at a distance `dt` in a step of this `size`. It is true if
-/// they differ by too much, and the step's `error` is a number; `x` is the state there.
+/// The comparison of the polynomial's rates with those of the law, at a part of a trial. It is true if they differ by too
+/// much, and the trial's error is a number; the state there is given unless it is the end.
 struct Strays<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
     at: &'a StepStart<S, D>,
-    from: &'a [S::Real; D],
-    x: &'a [S::Real; D],
-    size: S::Real,
-    error: S::Real,
-    dt: S::Real,
+    trial: &'a Trial<S, D>,
+    part: f64,
+    between: Option<&'a [S::Real; D]>,
     norm: &'a E,
 }
 
 impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Strays<'_, '_, S, D, E> {
-    type Output = S::Mask;
+    type Output = (S::Mask, bool);
 
     #[inline(always)]
-    fn run<V: InstructionSet>(self) -> S::Mask {
-        let Self { method, at, from, x, size, error, dt, norm } = self;
-        let rates = method.jets.rates(method.tape, at.t + dt, x, &at.sides);
+    fn run<V: InstructionSet>(self) -> (S::Mask, bool) {
+        let Self { method, at, trial, part, between, norm } = self;
+        let &Trial { size, error, .. } = trial;
+        let dt = size.scale(part);
+        let x = match between {
+            Some(x) => *x,
+            None => vector!(S::Real, D; n => trial.x[n].real()),
+        };
+        let rates = method.jets.rates(method.tape, at.t + dt, &x, &at.sides);
         let slope = method.jets.slope_here(dt);
         let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
-        let defect = norm.state().norm(defect, *from, *x);
-        error.finite().and(defect.less(S::Real::constant(MOST_DEFECT)).not())
+        let from = vector!(S::Real, D; n => at.x[n].real());
+        let defect = norm.state().norm(defect, from, x);
+        let bad = error.finite().and(defect.less(S::Real::constant(MOST_DEFECT)).not());
+        (bad, bad.any())
     }
 }
 
