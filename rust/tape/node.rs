@@ -219,8 +219,7 @@ impl Step {
                 return;
             }
             Node::Sin(a) | Node::SinOfTime(a) => {
-                to[1][0] = Function::Cos.of(of!(a));
-                to[0][0] = Function::Sin.of(of!(a));
+                (to[0][0], to[1][0]) = Function::Sin.pair(of!(a));
                 return;
             }
             Node::Tanh(a) => {

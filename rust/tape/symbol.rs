@@ -63,40 +63,53 @@ pub enum Function {
 }
 
 impl Function {
+    /// Its value.
+    #[inline(always)]
+    pub fn of<S: Scalar>(self, x: S) -> S {
+        self.pair(x).0
+    }
+
+    /// Its value, and for sine and cosine the value of the other one.
     // Never inlined: it would fill the loops over the orders, which need it once per step.
     #[inline(never)]
-    pub fn of<S: Scalar>(self, x: S) -> S {
+    pub(super) fn pair<S: Scalar>(self, x: S) -> (S, S) {
         if const { S::Real::LANES > 1 && size_of::<S>() == size_of::<S::Real>() } {
             // The instructions are those that the packets are made of.
-            return S::lift(S::Real::work(Isa::Baseline, Apply(self, x.real())));
+            let (value, other) = S::Real::work(Isa::Baseline, Apply(self, x.real()));
+            return (S::lift(value), S::lift(other));
         }
         match self {
-            Function::Sqrt => x.sqrt(),
-            Function::Exp => x.exp(),
-            Function::Ln => x.ln(),
-            Function::Sin => x.sin(),
-            Function::Cos => x.cos(),
-            Function::Tanh => x.tanh(),
+            Function::Sqrt => (x.sqrt(), x),
+            Function::Exp => (x.exp(), x),
+            Function::Ln => (x.ln(), x),
+            Function::Sin => x.sin_cos(),
+            Function::Cos => turned(x.sin_cos()),
+            Function::Tanh => (x.tanh(), x),
         }
     }
 }
 
-/// An elementary function of packets, by their own instructions: the same formulas as [`Function::of`] has.
+#[inline(always)]
+fn turned<T>((sine, cosine): (T, T)) -> (T, T) {
+    (cosine, sine)
+}
+
+/// An elementary function of packets, by their own instructions: the same formulas as [`Function::pair`] has.
 struct Apply<R>(Function, R);
 
 impl<R: Real> Work for Apply<R> {
-    type Output = R;
+    type Output = (R, R);
 
     #[inline(always)]
-    fn run<V: InstructionSet>(self) -> R {
+    fn run<V: InstructionSet>(self) -> (R, R) {
         let Self(function, x) = self;
         match function {
-            Function::Sqrt => x.sqrt(),
-            Function::Exp => elementary::exp(x),
-            Function::Ln => elementary::ln(x),
-            Function::Sin => elementary::sin_cos(x).0,
-            Function::Cos => elementary::sin_cos(x).1,
-            Function::Tanh => elementary::tanh(x),
+            Function::Sqrt => (x.sqrt(), x),
+            Function::Exp => (elementary::exp(x), x),
+            Function::Ln => (elementary::ln(x), x),
+            Function::Sin => elementary::sin_cos(x),
+            Function::Cos => turned(elementary::sin_cos(x)),
+            Function::Tanh => (elementary::tanh(x), x),
         }
     }
 }
