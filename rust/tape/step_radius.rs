@@ -1,5 +1,7 @@
 //! How far a Taylor polynomial reaches, and its values.
 
+use std::convert::identity;
+
 use super::{HIGH, Jets, LOW};
 use crate::scalar::elementary::power_rough;
 use crate::scalar::{InstructionSet, Mask, Packet, Real, Scalar, Work, vector};
@@ -35,8 +37,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     #[inline(always)]
     fn slope_of(&self, order: usize, dt: S::Real) -> [S::Real; D] {
         let series = self.coefficients();
-        let rate = |k: usize, c: S| c.real().scale(WEIGHTS[k]);
-        vector!(S::Real, D; n => value(&series[n][1..=order.min(N - 1)], dt, rate))
+        vector!(S::Real, D; n => value::<true, _, _>(&series[n][1..=order.min(N - 1)], dt, S::real))
     }
 
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
@@ -44,12 +45,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
         let (series, terms) = (self.coefficients(), order.min(N - 1) + 1);
         if const { size_of::<S>() == size_of::<S::Real>() } {
-            return vector!(S, D; n => value(&series[n][..terms], dt, same));
+            return vector!(S, D; n => value::<false, _, _>(&series[n][..terms], dt, identity));
         }
         // Derivatives fill the registers: one component after the other.
         let mut x = [S::zero(); D];
         for n in 0..D {
-            x[n] = value(&series[n][..terms], dt, same);
+            x[n] = value::<false, _, _>(&series[n][..terms], dt, identity);
         }
         x
     }
@@ -67,12 +68,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             let mut x = [S::Real::zero(); D];
             for n in 0..D {
                 if of[n] {
-                    x[n] = value(self.terms(n), dt, |_, c| c.real());
+                    x[n] = value::<false, _, _>(self.terms(n), dt, S::real);
                 }
             }
             return x;
         }
-        vector!(S::Real, D; n => if of[n] { value(self.terms(n), dt, |_, c| c.real()) } else { S::Real::zero() })
+        vector!(S::Real, D; n => if of[n] { value::<false, _, _>(self.terms(n), dt, S::real) } else { S::Real::zero() })
     }
 
     /// How far the solution may be followed by the series up to this order: the last two terms are then as small
@@ -139,16 +140,16 @@ const WEIGHTS: [f64; 24] = {
     weights
 };
 
-/// A coefficient as it is.
+/// A coefficient, or its weight times it.
 #[inline(always)]
-fn same<S>(_k: usize, c: S) -> S {
-    c
+fn weighted<const WEIGHTED: bool, T: Scalar>(k: usize, c: T) -> T {
+    if const { WEIGHTED } { c.scale(WEIGHTS[k]) } else { c }
 }
 
-/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type by their
-/// places.
+/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type, and does no more:
+/// the compiler need not inline it. The series of the derivative has weights.
 #[inline(always)]
-fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(usize, S) -> T) -> T {
+fn value<const WEIGHTED: bool, S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -> T {
     let dt2 = dt * dt;
     let dt4 = dt2 * dt2;
     // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
@@ -161,16 +162,16 @@ fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(usize, S) 
     let mut sums = [T::zero(); 4];
     let places = 1 + 4 * groups.len();
     for (r, (sum, &c)) in sums.iter_mut().zip(highest).enumerate() {
-        *sum = lift(places + r, c);
+        *sum = weighted::<WEIGHTED, T>(places + r, lift(c));
     }
     for (i, group) in groups.iter().enumerate().rev() {
         for r in 0..4 {
-            sums[r] = lift(1 + 4 * i + r, group[r]).fused_times(sums[r], dt4);
+            sums[r] = weighted::<WEIGHTED, T>(1 + 4 * i + r, lift(group[r])).fused_times(sums[r], dt4);
         }
     }
     // The state itself is added last, which rounds once.
     let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
-    lift(0, series[0]).fused_times(low.fused_times(high, dt2), dt)
+    weighted::<WEIGHTED, T>(0, lift(series[0])).fused_times(low.fused_times(high, dt2), dt)
 }
 
 /// The number without derivatives, in every lane.
@@ -210,7 +211,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
                 if of[n] {
-                    let found = value(jets.terms(n), places, |_, c| broadcast::<S, P, V>(c));
+                    let found = value::<false, _, _>(jets.terms(n), places, broadcast::<S, P, V>);
                     for i in 0..P {
                         states[i][n] = S::Real::constant(found.lane(i));
                     }
