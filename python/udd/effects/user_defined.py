@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from udd import _core
 from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression, text_of
+from udd._util.one_line import OneLine
 from udd._util.validation import array, number
 from udd.errors import ModelError
 
@@ -29,8 +30,8 @@ _SLOTS = {
 _MOMENTA = {"lateral": ("consistent", "constraint"), "vertical": ("consistent", "constraint")}
 
 
-@dataclass(frozen=True)
-class FormulaSpec(Spec):
+@dataclass(frozen=True, repr=False)
+class FormulaSpec(OneLine, Spec):
     """Specification of a user's formula: see :func:`formula`.
 
     Attributes

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._util import chi_squared
+from udd._util.one_line import OneLine
 from udd.fitting import Fit
 from udd.fitting.time_scale import motion_time_scale
 from udd.models.formula_model import FormulaModel
@@ -33,8 +34,8 @@ _MOST_PAIRS = 700_000  # evaluated in all: a few seconds
 _LINES = 24  # strongest lines of a frequency scan, whose neighbourhoods are scanned too
 
 
-@dataclass(frozen=True)
-class Scored:
+@dataclass(frozen=True, repr=False)
+class Scored(OneLine):
     """Score of one candidate.
 
     Attributes
