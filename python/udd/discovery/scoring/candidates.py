@@ -40,20 +40,19 @@ def library(
     friction that depends on the direction, for other models. `given` candidates come first. Terms that the
     free parameters absorb are not removed here, because that depends on the data.
     """
+    from .friction_terms import load_frictions, one_way
+
+    there = {effect.name for effect in model.effects}
     if isinstance(model, FormulaModel):
-        from .friction_terms import load_frictions
         from .term_library import delays, dry, terms, thresholds
 
-        there = {effect.name for effect in model.effects}
         turning = [] if states is None else [*dry(model, states), *thresholds(model, states)]
         turning += [] if states is None else load_frictions(model, states)
         listed = [c for c in (*given, *terms(model), *delays(model), *turning) if c.effect.name not in there]
         return list({(c.effect.name, c.effect.values): c for c in listed}.values())
-    from .friction_terms import one_way
-
     result = []
     for spec in effects.library():
-        if spec.name in {e.name for e in model.effects} or model.kind not in spec.bodies:
+        if spec.name in there or model.kind not in spec.bodies:
             continue
         if any(p.role in ("frequency", "scanned") for p in spec.parameters):
             continue
@@ -66,9 +65,10 @@ def library(
                 notes += [f"{p.name} = {chosen[p.name]:g}" for p in shapes if len(p.grid) > 1]
                 title = spec.title + (f" ({', '.join(notes)})" if notes else "")
                 result.append(Candidate(effect, title))
-    taken = {effect.name for effect in model.effects}
-    speed = np.ones(1) if states is None else states[:, model.state_names.index("Omega")]
-    return result + [candidate for candidate in one_way(speed) if candidate.effect.name not in taken]
+    if states is None:
+        return result
+    speed = states[:, model.state_names.index("Omega")]
+    return result + [candidate for candidate in one_way(speed) if candidate.effect.name not in there]
 
 
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:

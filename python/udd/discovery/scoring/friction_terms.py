@@ -146,18 +146,15 @@ def one_way(speed: Array) -> list[Candidate]:
 
     A motion (n,) that hardly turns back does not distinguish them from other friction.
     """
-    result: list[Candidate] = []
     if not abs(np.mean(speed)) < np.std(speed):
-        return result
-    for name, title, text in zip(
-        ONE_WAY,
-        ("friction that depends on the direction", "quadratic drag that depends on the direction"),
-        ("-a*abs(Omega)", "-a*Omega^2"),
-        strict=True,
-    ):
-        spec = written("torque", text, name, title, ["a"], None, ("a",))
-        result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title))
-    return result
+        return []
+    linear, quadratic = ONE_WAY
+    listed = (
+        (linear, "friction that depends on the direction", "-a*abs(Omega)"),
+        (quadratic, "quadratic drag that depends on the direction", "-a*Omega^2"),
+    )
+    specs = [written("torque", text, name, title, ["a"], None, ("a",)) for name, title, text in listed]
+    return [Candidate(effects.Effect(spec.name, (0.0,), made=spec), spec.title) for spec in specs]
 
 
 def further() -> tuple[FormulaSpec, ...]:

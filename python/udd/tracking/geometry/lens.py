@@ -149,8 +149,9 @@ def calibrate(
     spread = np.linalg.pinv(bent.jac.T @ bent.jac, hermitian=True)[:5, :5] * (2 * bent.cost / spare)
     sigma = np.where(free, np.sqrt(np.diag(spread)), 0.0)
     # a disk that hardly moves does not show the lens; what it shows, as a wobble, would become one
-    if (sigma > DETERMINED * PRIOR).any():
-        free = free & (sigma <= DETERMINED * PRIOR)
+    undetermined = sigma > DETERMINED * PRIOR
+    if undetermined.any():
+        free = free & ~undetermined
         bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
     if bent.cost > BETTER**2 * flat.cost:
         return Bent(as_given, sigma, False)
