@@ -133,6 +133,27 @@ def test_two_processes_make_one_store(tmp_path: Path) -> None:
     assert udd.sweep(spec, store=store).load().identical(udd.sweep(spec))
 
 
+def test_a_sweep_leaves_the_files_that_another_process_is_writing(tmp_path: Path) -> None:
+    """The chunk of the slower process would be lost on its way to its place."""
+    pytest.importorskip("zarr")
+    spec = udd.SweepSpec("outcome", udd.Disk(0.039), {"W": [0.03]}, [0, 1e-3, 0, 0], {"t": 0.01})
+    store = tmp_path / "both.zarr"
+    code = (
+        "import sys, udd; from udd.sweeps import run_sweep; "
+        "run_sweep.here = lambda *_: print('at work', flush=True) or sys.stdin.read(); "
+        "udd.sweep(udd.SweepSpec.from_json(sys.argv[1]), store=sys.argv[2])"
+    )
+    command = [sys.executable, "-W", "ignore", "-c", code, spec.to_json(), str(store)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as slow:
+        assert slow.stdout is not None and slow.stdout.readline() == b"at work\n"
+        half = store / "outcome" / f"{'0' * 32}.partial"
+        half.write_bytes(b"0")
+        udd.sweep(spec, store=store)
+        assert half.exists()
+    udd.sweep(spec, store=store)
+    assert slow.returncode == 0 and not half.exists()
+
+
 def test_a_store_that_another_process_makes_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     zarr = pytest.importorskip("zarr")
     spec = udd.SweepSpec("outcome", udd.Disk(0.039), {"W": [0.03]}, [0, 1e-3, 0, 0], {"t": 0.01})

@@ -68,6 +68,9 @@ class Memory:
     def tidy(self) -> None:
         """Do nothing: memory needs no cleaning."""
 
+    def close(self) -> None:
+        """Do nothing: no other sweep uses the arrays."""
+
     def dataset(self) -> xr.Dataset:
         """Return the dataset of the finished chunks."""
         import xarray as xr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import warnings
 from collections.abc import Callable
@@ -119,33 +120,34 @@ def sweep(
     # An executor has a worker for every core; alone, this process has them all.
     threads = 0 if executor is None else 1
     result = Memory(spec, grid, threads) if store is None else SweepStore(store, spec, grid, threads)
-    done = result.done()
-    sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
-    why, stopped = "some of the workers do not reach the store", False
-    with progress_bar(sum(sizes), "run", progress, title="sweep", initial=int(done @ sizes)) as bar:
+    with contextlib.closing(result):
+        done = result.done()
+        sizes = [prod(part.stop - part.start for part in grid.region(chunk)) for chunk in range(len(grid))]
+        why, stopped = "some of the workers do not reach the store", False
+        with progress_bar(sum(sizes), "run", progress, title="sweep", initial=int(done @ sizes)) as bar:
 
-        def keep(chunk: int, found: Any) -> None:
-            result.keep(chunk, found)
-            bar.update(sizes[chunk])
+            def keep(chunk: int, found: Any) -> None:
+                result.keep(chunk, found)
+                bar.update(sizes[chunk])
 
-        chunks = np.flatnonzero(~done).tolist()
-        try:
-            with result.writing():
-                if executor is None:
-                    here(result.work, chunks, result.arguments, keep)
-                else:
-                    spread(executor, result.work, chunks, result.arguments, keep)
-        except KeyboardInterrupt:
-            why, stopped = "stopped by Ctrl-C", True
-        except ChunksLost as error:
-            why = str(error)
-    missing = int((~result.done()).sum())
-    if missing:
-        message = f"{missing} of {len(grid)} chunks are not finished: {why}; {result.remedy}"
-        if stopped:
-            interrupted(result.dataset, message, partial)
+            chunks = np.flatnonzero(~done).tolist()
+            try:
+                with result.writing():
+                    if executor is None:
+                        here(result.work, chunks, result.arguments, keep)
+                    else:
+                        spread(executor, result.work, chunks, result.arguments, keep)
+            except KeyboardInterrupt:
+                why, stopped = "stopped by Ctrl-C", True
+            except ChunksLost as error:
+                why = str(error)
+        missing = int((~result.done()).sum())
+        if missing:
+            message = f"{missing} of {len(grid)} chunks are not finished: {why}; {result.remedy}"
+            if stopped:
+                interrupted(result.dataset, message, partial)
+            else:
+                warnings.warn(IncompleteWarning(message), stacklevel=outside())
         else:
-            warnings.warn(IncompleteWarning(message), stacklevel=outside())
-    else:
-        result.tidy()
-    return result.dataset()
+            result.tidy()
+        return result.dataset()

@@ -78,6 +78,9 @@ class SweepStore:
         }
         self._done = _array(self._group, "done", grid.counts)
         self._reached = False
+        root = getattr(self._group.store, "root", None)
+        self._folder = root / self._group.path if isinstance(root, Path) else None
+        self._use = None if self._folder is None else _in_use(self._folder)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
@@ -119,11 +122,16 @@ class SweepStore:
         return np.asarray(self._done[...], dtype=bool).ravel()
 
     def tidy(self) -> None:
-        """Remove the temporary files that killed writers left behind."""
-        root = getattr(self._group.store, "root", None)
-        if isinstance(root, Path):
-            for path in (root / self._group.path).rglob("*.partial"):
+        """Remove the temporary files of killed writers, unless another sweep uses the store."""
+        if self._folder is not None and self._use is not None and _only_user(self._use):
+            for path in self._folder.rglob("*.partial"):
                 path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Let other sweeps tidy the store."""
+        if self._use is not None:
+            os.close(self._use)
+            self._use = None
 
     def dataset(self) -> xr.Dataset:
         """Return the stored arrays, which are read when they are accessed."""
@@ -156,6 +164,29 @@ def _locked(store: str | os.PathLike[str] | zarr.Group) -> Iterator[None]:
                 stack.callback(os.close, folder)
                 fcntl.flock(folder, fcntl.LOCK_EX)
         yield
+
+
+def _in_use(folder: Path) -> int | None:
+    """Return an open file whose shared lock says that a sweep uses the store, if the system has locks."""
+    try:
+        import fcntl
+
+        place = os.open(folder / "done" / "zarr.json", os.O_RDONLY)  # written once
+        fcntl.flock(place, fcntl.LOCK_SH)
+    except (ImportError, OSError):
+        return None
+    return place
+
+
+def _only_user(place: int) -> bool:
+    """Return True if no other process holds the lock of `_in_use`."""
+    import fcntl
+
+    try:
+        fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _opened(store: str | os.PathLike[str] | zarr.Group, spec: SweepSpec, where: str) -> zarr.Group:
