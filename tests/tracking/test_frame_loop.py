@@ -19,7 +19,7 @@ import cv2
 import udd
 from small_films import shot
 from udd.tracking.correction import Correction
-from udd.tracking.detection import camera_motion
+from udd.tracking.detection import background as still
 from udd.tracking.geometry.pose import Pose
 from udd.tracking.passes.frame_loop import PoseSample, Prediction, Target, follow
 from udd.video.reader import Box, Film, Picture
@@ -98,19 +98,20 @@ def test_a_part_of_a_picture_is_corrected_as_the_whole() -> None:
     assert (turned(raw, (20, 80, 40, 100)).y == turned(raw).y).all()
 
 
-@pytest.mark.parametrize("reduction", [1, 2, 3])
+@pytest.mark.parametrize(("reduction", "coarseness"), [(1, 1), (2, 1), (3, 1), (1, 2), (1, 3), (2, 2)])
 def test_the_background_of_a_large_picture_is_followed_in_a_reduced_one(
-    reduction: int, monkeypatch: pytest.MonkeyPatch
+    reduction: int, coarseness: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = (600, 720)
-    monkeypatch.setattr(camera_motion, "LARGE", 0.99 * 600 * 720 / reduction**2)
+    monkeypatch.setattr(still, "LARGE", 0.99 * 600 * 720 / reduction**2)
+    monkeypatch.setattr(still, "SMALL", 0.98 * 600 * 720 / (reduction * coarseness) ** 2)
     first = wall(*size)
     factor, shift = 1.002 * np.exp(0.003j), 5.3 - 3.7j
     view = np.array([[factor.real, -factor.imag, shift.real], [factor.imag, factor.real, shift.imag]])
     then = np.asarray(cv2.warpAffine(first, view, size[::-1], borderMode=cv2.BORDER_REPLICATE), np.uint8)
     chroma = np.full((2, 2), 128, np.uint8)
-    background = camera_motion.Background(first, np.arange(256.0))
-    assert background.reduction == reduction
+    background = still.Background(first, np.arange(256.0))
+    assert (background.reduction, background.coarseness) == (reduction, coarseness)
     motion = background.follow([Picture(k, k / 25, y, chroma, chroma) for k, y in enumerate((first, then))])
     # both are against the mean of the two views
     for at in (100 + 80j, 600 + 500j):

@@ -20,7 +20,8 @@ from udd.film import Defects
 from udd.measurement import read_measurement
 from udd.tracking import pictures_at, pixels
 from udd.tracking.correction import Correction
-from udd.tracking.detection.camera_motion import Background, CameraMotion
+from udd.tracking.detection.background import Background
+from udd.tracking.detection.camera_motion import CameraMotion
 from udd.video.reader import Picture, light_of_codes
 
 COLOURS = ((200, 38, 44), (240, 134, 36), (30, 78, 186), (34, 138, 62))

@@ -25,7 +25,8 @@ from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.calibration.rim import Rim, outline
 from udd.tracking.calibration.scale import scale as size_of
 from udd.tracking.correction import Correction, applied, correction_of
-from udd.tracking.detection.camera_motion import CameraMotion, steadied
+from udd.tracking.detection.background import steadied
+from udd.tracking.detection.camera_motion import CameraMotion
 from udd.tracking.detection.frame_flags import GONE, VAGUE, lost
 from udd.tracking.detection.recognition import placed, recognise
 from udd.tracking.detection.survey import Survey, survey
