@@ -32,14 +32,14 @@ def section(generation: int, points: Array) -> bytes:
     return _pack(SECTION, generation, points.shape, points)
 
 
-def diagram(generation: int, found: Diagram) -> bytes:
+def diagram(generation: int, result: Diagram) -> bytes:
     """Starts, values, points, components; then the values, labels, periods and points."""
-    return _pack(DIAGRAM, generation, found.points.shape, *vars(found).values())
+    return _pack(DIAGRAM, generation, result.points.shape, *vars(result).values())
 
 
-def exponents(generation: int, found: Exponents) -> bytes:
+def exponents(generation: int, result: Exponents) -> bytes:
     """Encode exponents: their number, the drives, the exponents, their errors."""
-    return _pack(EXPONENTS, generation, found.values.shape, *vars(found).values())
+    return _pack(EXPONENTS, generation, result.values.shape, *vars(result).values())
 
 
 def frame(said: dict[str, Any], picture: bytes) -> bytes:

@@ -153,8 +153,8 @@ def basins(
     >>> import numpy as np
     >>> import udd
     >>> axis = np.linspace(-3, 3, 12)
-    >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
-    >>> found["period"].values.tolist(), found["mirror"].values.tolist()
+    >>> basins = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
+    >>> basins["period"].values.tolist(), basins["mirror"].values.tolist()
     ([2, 2], [2, 1])
     """
     xarray = require_xarray()

@@ -169,8 +169,8 @@ def bifurcation(
     The figure-eight, stable at large drives, loses its symmetry at w = 7.0964; at 5.3947 its period doubles.
 
     >>> import udd
-    >>> found = udd.bifurcation(udd.DLE(1.0), "w", [5.3, 6.0, 7.5, 9.0])
-    >>> found["period"].values.squeeze().tolist()
+    >>> diagram = udd.bifurcation(udd.DLE(1.0), "w", [5.3, 6.0, 7.5, 9.0])
+    >>> diagram["period"].values.squeeze().tolist()
     [4, 2, 2, 2]
     """
     xarray = require_xarray()

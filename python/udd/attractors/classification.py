@@ -117,24 +117,24 @@ class Classification:
         self.period[rows], self.rest[rows] = other.period, other.rest
 
 
-def put(found: Crossings, rows: NDArray[np.intp], other: Crossings) -> None:
+def put(crossings: Crossings, rows: NDArray[np.intp], other: Crossings) -> None:
     """Replace some jobs' points by later ones."""
     for name in ("points", "t", "outcome", "end"):
-        getattr(found, name)[rows] = getattr(other, name)
-    found.t_end[rows] += other.t_end
+        getattr(crossings, name)[rows] = getattr(other, name)
+    crossings.t_end[rows] += other.t_end
 
 
-def decided(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
+def decided(crossings: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
     """Return a mask of the jobs that have ended on an attractor."""
     is_decided: NDArray[np.bool_] = (
-        (found.outcome == FINISHED) & (verdicts.period != SETTLING)
+        (crossings.outcome == FINISHED) & (verdicts.period != SETTLING)
     ) | verdicts.rest
     return is_decided
 
 
-def followed_on(found: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
+def followed_on(crossings: Crossings, verdicts: Classification) -> NDArray[np.bool_]:
     """Return a mask of the jobs that still settle: they nearly return or rest, and can be continued."""
-    some: NDArray[np.bool_] = np.isin(found.outcome, (FINISHED, OUT_OF_TIME))
+    some: NDArray[np.bool_] = np.isin(crossings.outcome, (FINISHED, OUT_OF_TIME))
     some &= verdicts.period == SETTLING
     return some
 

@@ -13,19 +13,21 @@ from udd.models.state_scaling import Coordinates, Floats
 from .attractor import Attractor, alike, distance_between, mirrored
 
 
-def groups(found: list[Attractor], tight: Tightness) -> list[int]:
+def groups(attractors: list[Attractor], tight: Tightness) -> list[int]:
     """Return the place of the first equal attractor for each attractor."""
     first: list[int] = []
-    for k, attractor in enumerate(found):
-        same = (j for j in sorted(set(first)) if alike(found[j], attractor, tight))
+    for k, attractor in enumerate(attractors):
+        same = (j for j in sorted(set(first)) if alike(attractors[j], attractor, tight))
         first.append(next(same, k))
     return first
 
 
-def mirror_images(found: list[Attractor], of: int, coordinates: Coordinates, tight: Tightness) -> list[int]:
+def mirror_images(
+    attractors: list[Attractor], of: int, coordinates: Coordinates, tight: Tightness
+) -> list[int]:
     """Return the places of an attractor's mirror images, its own included if it is symmetric."""
-    images = [mirrored(found[of], sign, coordinates) for sign in coordinates.mirrors]
-    return [k for k, other in enumerate(found) if any(alike(image, other, tight) for image in images)]
+    images = [mirrored(attractors[of], sign, coordinates) for sign in coordinates.mirrors]
+    return [k for k, other in enumerate(attractors) if any(alike(image, other, tight) for image in images)]
 
 
 @dataclass

@@ -275,10 +275,10 @@ def _bautin_near(point: SurfacePoint, surface: SolutionSurface, box: Floats) -> 
         return []
     rests = SolutionSurface(hopf._curve, surface.second, surface.scale)
     way = _Way(rests, "Hopf", box, _BESIDE, _BESIDE, _TRIED)
-    found = [one for sense in (1.0, -1.0) for one in way.follow(rests.start(hopf._place), sense).points]
-    found = [one for one in found if one.kind == "Bautin"]
+    points = [one for sense in (1.0, -1.0) for one in way.follow(rests.start(hopf._place), sense).points]
+    points = [one for one in points if one.kind == "Bautin"]
     here = surface.values(point)
-    return sorted(found, key=lambda one: float(np.abs(one.values - here).max()))[:1]
+    return sorted(points, key=lambda one: float(np.abs(one.values - here).max()))[:1]
 
 
 @dataclass(frozen=True)

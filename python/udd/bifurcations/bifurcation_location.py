@@ -174,9 +174,9 @@ def nearest_bifurcation(
                 there, gone, size = predictor_corrector_step(curve, here, size, step)
                 after = curve.test_functions(there)
                 passed = bifurcations_between(curve, here, gone, signs, after)
-                found = next((entry for entry in passed if entry[0] == kind), None)
-                if found is not None:
-                    _, sigma, place, at = found
+                crossing = next((entry for entry in passed if entry[0] == kind), None)
+                if crossing is not None:
+                    _, sigma, place, at = crossing
                     errors = curve.location_error(here, sigma, place, gone, FUNCTIONS[kind])
                     points.append(point_at(curve, kind, place, at, errors=errors))
                     break

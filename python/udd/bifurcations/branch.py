@@ -279,8 +279,8 @@ class Branch(Drawable):
         """
         model, points = self.model, self.points
         attrs = {"model": repr(model), "parameter": self.parameter, "kind": self.kind}
-        found = of_states(model.state_names, model.state_units, self.states, ["place"], {}, **attrs)
-        return found.assign_coords(bifurcation=[point.kind for point in points]).assign(
+        dataset = of_states(model.state_names, model.state_units, self.states, ["place"], {}, **attrs)
+        return dataset.assign_coords(bifurcation=[point.kind for point in points]).assign(
             {
                 self.parameter: ("place", self.values),
                 "period": ("place", self.periods),
@@ -316,11 +316,11 @@ class Branch(Drawable):
 
     def __repr__(self) -> str:
         ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}" if len(self) else "nowhere"
-        found = "; ".join(f"{point.kind} at {point.value:.10g}" for point in self.points)
+        listed = "; ".join(f"{point.kind} at {point.value:.10g}" for point in self.points)
         what = "equilibria" if self.kind == "equilibrium" else "cycles"
         what = f"symmetric {what}" if self.symmetric else what
         return (
-            f"<Branch of {what}, {self.parameter} = {ends}, {len(self)} points: {found or 'no bifurcation'}>"
+            f"<Branch of {what}, {self.parameter} = {ends}, {len(self)} points: {listed or 'no bifurcation'}>"
         )
 
 

@@ -150,8 +150,8 @@ def diagram(
     Examples
     --------
     >>> import numpy as np, udd
-    >>> found = udd.diagram(udd.DLE(8.0), "w", np.linspace(6.9, 7.3, 9), n=24)
-    >>> [(point.kind, round(point.value, 8)) for point in found.points]
+    >>> diagram = udd.diagram(udd.DLE(8.0), "w", np.linspace(6.9, 7.3, 9), n=24)
+    >>> [(point.kind, round(point.value, 8)) for point in diagram.points]
     [('symmetry breaking', 7.09642643)]
     """
     axis = parameter_values(model, parameter, values)

@@ -163,8 +163,8 @@ def connection(branch: Branch) -> Connection:
     >>> import udd
     >>> rest = udd.equilibria(udd.DLE(2.5, B=0.2))[0]
     >>> hopf = udd.continuation(rest, "w", (1.0, 9.0)).points[0]
-    >>> found = udd.connection(udd.continuation(hopf, max_period=16.0))
-    >>> print(found.kind, round(found.value, 8), found.wild)
+    >>> orbit = udd.connection(udd.continuation(hopf, max_period=16.0))
+    >>> print(orbit.kind, round(orbit.value, 8), orbit.wild)
     homoclinic 4.25994905 False
     """
     curve, u = cycles_of(branch)[int(np.argmax(branch.periods))]
@@ -255,9 +255,9 @@ def _fold_near(curve: PeriodicOrbitCurve, u: Floats) -> BifurcationPoint | None:
         return np.append(residual, np.linalg.det(matrix[:, :-1]))
 
     try:
-        found = optimize.root(equations, begin)
-        guess = found.x
-        if not found.success or np.linalg.norm(rests.state(guess) / flow.size - slow / flow.size) > _NEAR:
+        solution = optimize.root(equations, begin)
+        guess = solution.x
+        if not solution.success or np.linalg.norm(rests.state(guess) / flow.size - slow / flow.size) > _NEAR:
             return None
         along = np.linalg.svd(rests.equations(guess)[1])[2][-1]
         return nearest_bifurcation(rests, guess - _BESIDE * along, along, "fold", 2.0 * _BESIDE)

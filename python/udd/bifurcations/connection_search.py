@@ -127,8 +127,8 @@ def connections(
     Examples
     --------
     >>> import udd
-    >>> found = udd.connections(udd.DLE(4.0, B=0.2), "w", (4.0, 4.5), n=20, t_max=10.0)
-    >>> [(one.kind, round(one.value, 8)) for one in found]
+    >>> connections = udd.connections(udd.DLE(4.0, B=0.2), "w", (4.0, 4.5), n=20, t_max=10.0)
+    >>> [(one.kind, round(one.value, 8)) for one in connections]
     [('homoclinic', 4.25994905)]
     """
     low, high = bounds_of(bounds)

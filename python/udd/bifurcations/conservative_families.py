@@ -67,9 +67,9 @@ class Conserved:
 
     def at(self, flow: FlowMap, x: Floats) -> tuple[float, Floats]:
         """Return the quantity at a reduced state, and its derivatives (r,)."""
-        found = _core.expansion(self.law, 0.0, flow.full(x).tolist(), False)
-        slope: Floats = found["by_state"][0, flow.kept]
-        return float(found["rate"][0]), slope
+        expansion = _core.expansion(self.law, 0.0, flow.full(x).tolist(), False)
+        slope: Floats = expansion["by_state"][0, flow.kept]
+        return float(expansion["rate"][0]), slope
 
 
 def _plain(model: Model) -> dict[str, float]:

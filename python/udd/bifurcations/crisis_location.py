@@ -310,8 +310,8 @@ class _Search:
             bottom, u = self._fold(saddle, float(y[1]), time, rounds, float(y[2]), accuracy.loose)
             return bottom, np.array([y[0], u, _NARROW])
 
-        found = secant(fold, np.array([x[0], x[1] + earlier, _WIDE]), step)
-        return np.array([found[0], found[1] - earlier, _WIDE])
+        root = secant(fold, np.array([x[0], x[1] + earlier, _WIDE]), step)
+        return np.array([root[0], root[1] - earlier, _WIDE])
 
     def _fold(
         self, saddle: SaddleCycle, u: float, t: float, rounds: int, width: float, loose: float

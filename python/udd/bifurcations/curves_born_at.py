@@ -41,11 +41,11 @@ def homoclinic_at(point: LocusPoint, bounds: Sequence[float]) -> Connection:
     for hopf in _hopf_points(point):
         cycles = continuation(hopf, hopf.parameter, bounds, max_period=_ROUNDS * hopf.period, max_points=400)
         try:
-            found = connection(cycles)
+            orbit = connection(cycles)
         except ModelError:
             continue
-        if found.kind == "homoclinic":
-            return found
+        if orbit.kind == "homoclinic":
+            return orbit
     raise ModelError(f"no homoclinic orbit is found near the Bogdanov-Takens point at {_where(point)}")
 
 

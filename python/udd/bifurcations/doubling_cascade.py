@@ -150,8 +150,8 @@ def cascade(
     Examples
     --------
     >>> import udd
-    >>> found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=3)
-    >>> found.values.round(6).tolist()
+    >>> cascade = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=3)
+    >>> cascade.values.round(6).tolist()
     [5.394713, 5.086062, 5.02182]
     """
     n = whole("n", n, 1)

@@ -63,8 +63,10 @@ def multipliers_at(curve: PeriodicOrbitCurve, u: Floats) -> Multipliers:
     multiplied with one another: weak multipliers are accurate next to strong ones.
     """
     factors = curve.factors_across(u)
-    found = _core.floquet(factors)
-    if found is None:
+    multipliers = _core.floquet(factors)
+    if multipliers is None:
         lost = np.full(factors.shape[1], np.nan)
         return Multipliers(lost, lost.astype(complex), np.full(factors.shape[1], np.inf))
-    return Multipliers(found["log"], found["re"] + 1j * found["im"], _ROUGH * found["condition"])
+    return Multipliers(
+        multipliers["log"], multipliers["re"] + 1j * multipliers["im"], _ROUGH * multipliers["condition"]
+    )

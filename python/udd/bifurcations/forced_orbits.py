@@ -38,11 +38,11 @@ class Forcing:
     def period(self, values: Floats) -> tuple[float, Floats]:
         """Return the period for these parameters, and its derivatives (p,) by them."""
         law = self.law.with_parameters(dict(zip(self.law.parameters, values.tolist(), strict=True)))
-        found = _core.expansion(law, 0.0, [0.0], False)
-        period = float(found["rate"][0])
+        expansion = _core.expansion(law, 0.0, [0.0], False)
+        period = float(expansion["rate"][0])
         if not (np.isfinite(period) and period > 0.0):
             raise ModelError(f"the period {self.law.texts[0]} is {period:g}, not above zero")
-        return period, found["by_parameter"][:, 0]
+        return period, expansion["by_parameter"][:, 0]
 
 
 def forcing_of(model: Model, period: float | str) -> Forcing:

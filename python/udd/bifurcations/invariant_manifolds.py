@@ -99,9 +99,9 @@ class ManifoldFamily:
         """Return the equilibrium near a guess; if Powell's method stalls, start next to the guess."""
         aside = np.random.default_rng(8).uniform(-_ASIDE, _ASIDE, (_TRIES, len(guess)))
         for shift in (np.zeros(len(guess)), *aside):
-            found = refined(self.flow, self.values_at(value), guess + shift * self.flow.size)
-            if found is not None:
-                return found
+            curve = refined(self.flow, self.values_at(value), guess + shift * self.flow.size)
+            if curve is not None:
+                return curve
         return None
 
     def alone(self, value: float, rest: Floats) -> Eigendirection | None:
@@ -115,11 +115,11 @@ class ManifoldFamily:
 
     def curves(self, values: Floats, rests: list[Floats]) -> list[ManifoldCurve]:
         """Return the curve at each value, from near the equilibrium until it has gone far or time is up."""
-        found: list[ManifoldCurve] = []
+        curves: list[ManifoldCurve] = []
         for first in range(0, len(values), _ROWS):
             part = slice(first, first + _ROWS)
-            found += self._followed(values[part], rests[part])
-        return found
+            curves += self._followed(values[part], rests[part])
+        return curves
 
     def _followed(self, values: Floats, rests: list[Floats]) -> list[ManifoldCurve]:
         flow, step = self.flow, self.flow.clock / FINE

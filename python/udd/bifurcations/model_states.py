@@ -24,7 +24,7 @@ def state_of_attractor(model: Model, attractor: Any) -> tuple[Model, Floats, flo
         )
     points = [np.asarray(attractor[f"{prefix}{name}"], dtype=np.float64) for name in names]
     if attractor["period_time"].ndim or any(component.ndim != 1 for component in points):
-        raise ModelError("one attractor is needed: select it, as in found.sel(number=1)")
+        raise ModelError("one attractor is needed: select it, as in basins.sel(number=1)")
     time, state = float(attractor["period_time"]), np.array([component[0] for component in points])
     if not np.isfinite(time) or time <= 0.0 or not np.isfinite(state).all():
         raise ModelError("this attractor is not periodic")

@@ -65,8 +65,8 @@ def periodic_orbit(
     guess : array_like, shape (dim,) or (n, dim), or xarray.Dataset, optional
         A state near the cycle, or states on it at equal distances of time over one period, which must then
         be given. One attractor of :func:`udd.basins` or :func:`udd.bifurcation`, such as
-        ``found.sel(number=2)`` or ``found.isel(path=0, start=0).sel(w=6.0)``, gives its state, its period and
-        the value of the parameter. By default the search starts where :func:`udd.lyapunov` does.
+        ``basins.sel(number=2)`` or ``basins.isel(path=0, start=0).sel(w=6.0)``, gives its state, its period
+        and the value of the parameter. By default the search starts where :func:`udd.lyapunov` does.
     period : float or str, optional
         About its period. By default the run from the guess tells it: the first time that it comes back, or
         nearly back, be it to the mirror image. A forced model needs exactly the forcing's period, or a
@@ -124,8 +124,8 @@ def periodic_orbit(
 
     >>> import numpy as np
     >>> axis = np.linspace(-3, 3, 8)
-    >>> found = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
-    >>> udd.periodic_orbit(udd.DLE(6.2), found.sel(number=2)).symmetric
+    >>> basins = udd.basins(udd.DLE(6.2), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=24)
+    >>> udd.periodic_orbit(udd.DLE(6.2), basins.sel(number=2)).symmetric
     False
 
     Duffing's oscillator, forced, and the frequencies at which its amplitude jumps:
@@ -278,10 +278,10 @@ def _simplest(curve: PeriodicOrbitCurve, u: Floats) -> tuple[PeriodicOrbitCurve,
             continue  # it has hardly left its start, where it is slow
         nodes = flown(flow, values, start, share, flow.pieces_for(share))
         try:
-            found = closed(replace(flow, model=model), nodes[:-1], share, mirror, shift)
+            closing = closed(replace(flow, model=model), nodes[:-1], share, mirror, shift)
         except ModelError:
             continue
-        return _simplest(*found)
+        return _simplest(*closing)
     return curve, u
 
 

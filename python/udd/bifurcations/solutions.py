@@ -39,8 +39,8 @@ class FoundList(list[Found]):
         A sentence about the extent and method of the search: other solutions may exist.
     """
 
-    def __init__(self, found: Iterable[Found], search: str) -> None:
-        super().__init__(found)
+    def __init__(self, solutions: Iterable[Found], search: str) -> None:
+        super().__init__(solutions)
         self.search = search
 
     def __repr__(self) -> str:

@@ -132,8 +132,8 @@ def lifetimes(
     >>> model = udd.DLE(3.4, B=0.2)
     >>> rotation = [rest for rest in udd.equilibria(model) if rest.stable]
     >>> starts = np.random.default_rng(1).normal(size=(64, 3)) + [0, 1, -3]
-    >>> found = udd.lifetimes(model, starts, rotation, t_max=2000.0)
-    >>> bool(found.settled.mean() > 0.0)
+    >>> lifetimes = udd.lifetimes(model, starts, rotation, t_max=2000.0)
+    >>> bool(lifetimes.settled.mean() > 0.0)
     True
     """
     require_model(model)

@@ -217,8 +217,8 @@ def lyapunov_spectrum(
     Examples
     --------
     >>> import udd
-    >>> found = udd.lyapunov_spectrum(1.0, tol=5e-3)
-    >>> found.verdict, round(float(found.exponents.sum()), 6)
+    >>> spectrum = udd.lyapunov_spectrum(1.0, tol=5e-3)
+    >>> spectrum.verdict, round(float(spectrum.exponents.sum()), 6)
     ('chaos', -1.0)
     >>> udd.lyapunov_spectrum(10.0).verdict
     'periodic orbit'
@@ -526,10 +526,10 @@ def covariant_vectors(
 
     >>> import numpy as np
     >>> import udd
-    >>> found = udd.covariant_vectors(udd.DLE(1.0), 100)
-    >>> flow = udd.DLE(1.0).rates(found.t, found.state)
+    >>> covariant = udd.covariant_vectors(udd.DLE(1.0), 100)
+    >>> flow = udd.DLE(1.0).rates(covariant.t, covariant.state)
     >>> flow /= np.linalg.norm(flow, axis=1, keepdims=True)
-    >>> bool(abs(np.einsum("kn,kn->k", flow, found.vectors[:, 1])).min() > 1 - 1e-6)
+    >>> bool(abs(np.einsum("kn,kn->k", flow, covariant.vectors[:, 1])).min() > 1 - 1e-6)
     True
     """
     require_model(model)

@@ -167,8 +167,8 @@ def discover(
     >>> truth = udd.Pendulum(1.0, k0=0.01, effects=[udd.effects.quadratic_drag(c=0.05)])
     >>> theta = udd.simulate(truth, t, [0.0, 1.0]).state[:, 1]
     >>> noise = 2e-3 * np.random.default_rng(0).standard_normal(len(t))
-    >>> found = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.03))
-    >>> [effect.title for effect in found.effects]
+    >>> discovery = udd.discover(udd.Measurement(t, {"theta": theta + noise}), udd.Pendulum(1.0, k0=0.03))
+    >>> [effect.title for effect in discovery.effects]
     ['quadratic drag']
     """
     assert callable(progress)

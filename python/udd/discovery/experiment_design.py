@@ -113,8 +113,8 @@ def hints(discovery: Discovery) -> list[NextExperiment]:
     >>> t = np.arange(0, 30, 0.05)
     >>> noise = 2e-3 * np.random.default_rng(0).standard_normal(len(t))
     >>> theta = udd.simulate(udd.Pendulum(1.0, k0=0.02), t, [0.0, 1.0]).state[:, 1] + noise
-    >>> found = udd.discover(udd.Measurement(t, {"theta": theta}), udd.Pendulum(1.0, k0=0.03))
-    >>> found.hints
+    >>> discovery = udd.discover(udd.Measurement(t, {"theta": theta}), udd.Pendulum(1.0, k0=0.03))
+    >>> discovery.hints
     []
     """
     if not discovery.alternatives:

@@ -98,8 +98,8 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
     >>> x = udd.simulate(cart, t, [0.0, 0.0], inputs={"u": drive}).x + 1e-3 * rng.normal(size=len(t))
     >>> noisy = drive + 0.3 * rng.normal(size=len(t))
     >>> fit = udd.fit(udd.Measurement(t, {"x": x}, inputs={"u": noisy}), cart)
-    >>> found = udd.input_bias(fit)
-    >>> list(found.bias), abs(found.bias["g"]) < 0.2
+    >>> bias = udd.input_bias(fit)
+    >>> list(bias.bias), abs(bias.bias["g"]) < 0.2
     (['g'], True)
     """
     if not fit.model.inputs:

@@ -50,8 +50,8 @@ def bifurcation(
     Examples
     --------
     >>> import udd
-    >>> found = udd.bifurcation(udd.DLE(1.0), "w", [5.3, 6.0, 7.5], n=40)
-    >>> udd.plot.bifurcation(found).get_ylabel()
+    >>> diagram = udd.bifurcation(udd.DLE(1.0), "w", [5.3, 6.0, 7.5], n=40)
+    >>> udd.plot.bifurcation(diagram).get_ylabel()
     'ω [1]'
     """
     parameter = result.attrs.get("parameter")

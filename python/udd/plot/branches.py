@@ -143,8 +143,8 @@ def diagram(result: Diagram, ax: Axes | None = None, *, component: str | None = 
     Examples
     --------
     >>> import numpy as np, udd
-    >>> found = udd.diagram(udd.DLE(8.0), "w", np.linspace(7.0, 7.4, 5), n=24)
-    >>> udd.plot.diagram(found).get_ylabel()
+    >>> diagram = udd.diagram(udd.DLE(8.0), "w", np.linspace(7.0, 7.4, 5), n=24)
+    >>> udd.plot.diagram(diagram).get_ylabel()
     'ω [1]'
     """
     from udd.bifurcations.branch_diagram import Diagram

@@ -55,9 +55,9 @@ class Memory:
         """Return the arguments of `work`."""
         return part_of(self._spec, self._grid, chunk), self._threads
 
-    def keep(self, chunk: int, found: Found) -> None:
+    def keep(self, chunk: int, arrays: Found) -> None:
         """Take what `work` gave."""
-        for name, values in found.items():
+        for name, values in arrays.items():
             self._arrays[name][self._grid.region(chunk)] = values
         self._done[chunk] = True
 

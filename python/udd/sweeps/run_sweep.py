@@ -96,8 +96,8 @@ def sweep(
     >>> import numpy as np
     >>> import udd
     >>> spec = udd.SweepSpec("lyapunov", udd.DLE(1.0), {"w": np.linspace(0.5, 2, 4)}, options={"tol": 0.02})
-    >>> found = udd.sweep(spec)
-    >>> found["value"].sizes["w"], bool((found["standard_error"] <= 0.02).all())
+    >>> exponents = udd.sweep(spec)
+    >>> exponents["value"].sizes["w"], bool((exponents["standard_error"] <= 0.02).all())
     (4, True)
 
     Two axes, in threads, into a store; the second call finds all done.
@@ -126,8 +126,8 @@ def sweep(
         why, stopped = "some of the workers do not reach the store", False
         with progress_bar(sum(sizes), "run", progress, title="sweep", initial=int(done @ sizes)) as bar:
 
-            def keep(chunk: int, found: Any) -> None:
-                result.keep(chunk, found)
+            def keep(chunk: int, arrays: Any) -> None:
+                result.keep(chunk, arrays)
                 bar.update(sizes[chunk])
 
             chunks = np.flatnonzero(~done).tolist()
