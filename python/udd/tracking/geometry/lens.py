@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Array = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -145,17 +149,27 @@ def calibrate(
     flat = least_squares(lambda x: rest(x, False), start, loss="soft_l1", f_scale=0.1)
     bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
     spare = max(int(2 * seen.sum() - 3 * len(points)) - 2 * n - 5, 1)
-    # the loss is about rms^2 / 2 per spare coordinate; the weak priors are in the Jacobian
-    spread = np.linalg.pinv(bent.jac.T @ bent.jac, hermitian=True)[:5, :5] * (2 * bent.cost / spare)
+    spread = _spread(bent, spare)
     sigma = np.where(free, np.sqrt(np.diag(spread)), 0.0)
     # a disk that hardly moves does not show the lens; what it shows, as a wobble, would become one
     undetermined = sigma > DETERMINED * PRIOR
     if undetermined.any():
         free = free & ~undetermined
         bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
+        # the terms at 0 have the errors of their prior, and displace the others
+        carried = spread[:, undetermined] @ np.linalg.pinv(spread[np.ix_(undetermined, undetermined)])
+        variance = np.diag(_spread(bent, spare)) + carried**2 @ PRIOR[undetermined] ** 2
+        sigma = np.where(free, np.sqrt(variance), sigma)
     if bent.cost > BETTER**2 * flat.cost:
         return Bent(as_given, sigma, False)
     return Bent(Lens(middle, size, *(float(v) for v in np.where(free, bent.x[:5], fixed))), sigma, True)
+
+
+def _spread(bent: OptimizeResult, spare: int) -> Array:
+    """Return the covariance (5, 5) of the terms of a lens at a minimum."""
+    # the loss is about rms^2 / 2 per spare coordinate; the weak priors are in the Jacobian
+    inverse = np.linalg.pinv(bent.jac.T @ bent.jac, hermitian=True)
+    return np.asarray(inverse[:5, :5] * (2 * bent.cost / spare))
 
 
 def _layout(points: Complexes, body: Complexes) -> Complexes:
