@@ -28,7 +28,7 @@ from udd.tracking.marks.rigid_fit import solve
 from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.pixels_to_metres import Camera
 from udd.tracking.metric.pose_covariance import _belief, covariance
-from udd.tracking.passes.second_pass import to_mid_exposure
+from udd.tracking.passes.local_motion import to_mid_exposure
 from udd.tracking.passes.tracks import FrameTrack, Tracks, found_in
 from udd.video.reader import Picture, light_of_codes
 

@@ -24,7 +24,7 @@ from udd.film import Defects, Film
 from udd.report.tracking import calibration, chosen
 from udd.tracking import page
 from udd.tracking.metric.rolling_check import health
-from udd.tracking.pipeline import Tracking
+from udd.tracking.tracking_result import Tracking
 
 
 @pytest.fixture(scope="module")

@@ -154,7 +154,8 @@ def _tracked(file: Path, options: dict[str, Any], tell: Tell) -> Measurement:
     import cv2
 
     from udd.tracking import TrackedFrame, TrackError
-    from udd.tracking.pipeline import Tracking, run_tracker
+    from udd.tracking.pipeline import run_tracker
+    from udd.tracking.tracking_result import Tracking
 
     tell({"say": "looking over the film"})
     last = 0.0

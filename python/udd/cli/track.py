@@ -290,7 +290,8 @@ def _tracked(
     """Track the film; what was found on the way comes into `detail`."""
 
     def measure() -> Measurement:
-        from udd.tracking.pipeline import Tracking, run_tracker
+        from udd.tracking.pipeline import run_tracker
+        from udd.tracking.tracking_result import Tracking
 
         motion = run_tracker(args.file, progress=shown_progress(), disk_radius=args.disk_radius, **options)
         if not isinstance(motion, Tracking):

@@ -64,7 +64,7 @@ def write_tracked(
 ) -> None:
     """Write the page of :func:`udd.tracking.page`."""
     from udd.tracking.metric.rolling_check import health
-    from udd.tracking.pipeline import Tracking
+    from udd.tracking.tracking_result import Tracking
 
     refuse_folder(path)
     detail = result if isinstance(result, Tracking) else None

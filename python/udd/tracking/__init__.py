@@ -11,8 +11,10 @@ from udd.video.webcam import Recording, record
 from .options import TrackOptions
 from .overlay import overlay
 from .page import page
-from .pipeline import Tracking, pictures_at, pictures_between, track, track_disk
+from .pictures import pictures_at, pictures_between
+from .pipeline import track, track_disk
 from .tracked_frame import TrackedFrame
+from .tracking_result import Tracking
 
 __all__ = [
     "Film",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from udd.measurement import Measurement
 
-    from .pipeline import Tracking
+    from .tracking_result import Tracking
 
 
 def page(

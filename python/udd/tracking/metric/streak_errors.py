@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.tracking.geometry.pose import DiskAppearance, moved_by_pose
-from udd.tracking.passes.second_pass import LocalMotion
+from udd.tracking.passes.local_motion import LocalMotion
 from udd.tracking.passes.tracks import Tracks
 
 Array = NDArray[np.float64]

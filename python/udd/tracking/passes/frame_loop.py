@@ -89,7 +89,19 @@ class Target(ABC, Generic[Seen, Row]):
         """Return the row of a frame in the target's table; `seen` is None if it was not located."""
 
 
-class Follower(Generic[Seen, Row]):
+class Observer(ABC):
+    """A part of a pass that looks at each frame of a film in turn."""
+
+    @abstractmethod
+    def look(self, corrected: Corrected, t: float, shape: tuple[int, ...]) -> Pose:
+        """Look at the next frame, and return the pose of the target; NaN if it is not located."""
+
+    def end(self) -> None:
+        """Finish after the last frame."""
+        return
+
+
+class Follower(Observer, Generic[Seen, Row]):
     """A target with its last poses and the rows of its table."""
 
     def __init__(self, target: Target[Seen, Row]) -> None:
@@ -132,19 +144,26 @@ class Follower(Generic[Seen, Row]):
         return is_copy(y, self.last, places, about)
 
 
+def observe(film: Film, observers: Sequence[Observer], tick: Callable[[Picture, Pose], object]) -> None:
+    """Show each frame of a film to observers.
+
+    After each picture `tick` is called with the uncorrected picture and the pose that the first observer
+    returns.
+    """
+    for picture in film.uncorrected():
+        corrected = partial(film.corrected, picture)
+        poses = [each.look(corrected, picture.t, picture.y.shape) for each in observers]
+        tick(picture, poses[0])
+    for each in observers:
+        each.end()
+
+
 def follow(
     film: Film, targets: Sequence[Target[Seen, Row]], tick: Callable[[Picture, Pose], object]
 ) -> list[list[Row]]:
-    """Follow targets through a film, and return the rows of each.
-
-    After each picture `tick` is called with the uncorrected picture and the pose of the first target, NaN if
-    it is not located.
-    """
+    """Follow targets through a film, and return the rows of each."""
     followers = [Follower(target) for target in targets]
-    for picture in film.uncorrected():
-        corrected = partial(film.corrected, picture)
-        poses = [each.look(corrected, picture.t, picture.y.shape) for each in followers]
-        tick(picture, poses[0])
+    observe(film, followers, tick)
     return [each.rows for each in followers]
 
 

@@ -32,7 +32,7 @@ from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, Plane, TrackError
 
 from .first_pass import TrackerState
-from .second_pass import LocalMotion
+from .local_motion import LocalMotion
 from .tracks import Tracks
 
 AGAIN = 3  # rounds in which marks are learned from slow frames when their motion is known

@@ -4,57 +4,34 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.tracking.detection.frame_flags import is_lost, lost
-from udd.tracking.geometry.intervals import usual_interval
-from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
+from udd.tracking.geometry.pose import DiskAppearance, Pose
 from udd.tracking.marks.localization import MISFIT
 from udd.video.reader import Film, Picture
 
 from .first_pass import TrackerState, fit_and_check
+from .frame_loop import NOWHERE, Corrected, Observer, observe
+from .local_motion import LONG, NEAR, WEAK_MARKS, LocalMotion, weak
 from .tracks import FrameTrack, Tracks, found_in, lost_in
 
 Array = NDArray[np.float64]
-EACH_SIDE = 2  # neighbours on each side
-NEAR = 3.5  # intervals within which a neighbour tells anything
 KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
 FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
 APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
 APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
-LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
-WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
-WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
-# where the second derivative jumps, as friction makes it where a disk turns back: its error times interval^2
-# against the miss, rms over the times at which it may jump, for the mean over a whole interval
-JUMP = 1.10
 FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
-
-
-@dataclass(frozen=True)
-class Local:
-    """Pose and its rates at one instant [pixels, rad, s]."""
-
-    pose: Pose
-    rate: complex
-    spin: float
-    bending: complex  # second derivative of the centre
-    twisting: float
-    tracked: bool  # by the first pass
-
-    def motion(self, open_for: float) -> Motion:
-        """Return the motion in an exposure."""
-        return Motion.of_rates(self.rate, self.spin, self.bending, self.twisting, open_for)
 
 
 def refine(
     film: Film,
     state: TrackerState,
     first: Tracks,
-    tick: Callable[[int], object] = lambda _: None,
+    tick: Callable[[Picture, Pose], object] = lambda picture, pose: None,
     again: bool = False,
     look_at: Callable[[int], DiskAppearance] | None = None,
 ) -> Tracks:
@@ -65,40 +42,72 @@ def refine(
     and lost ones, are fitted once more as soon as their neighbours are. `look_at` gives each frame's
     appearance if it is not always the same.
     """
-    better: dict[int, FrameTrack] = {}
-    best: dict[int, FrameTrack] = {}
-    around = LocalMotion(first)
-    reach = NEAR * around.interval
-    waiting: deque[tuple[int, Picture]] = deque()
+    refiner = Refiner(state, first, again, look_at)
+    observe(film, [refiner], tick)
+    return first.with_frames(refiner.better | refiner.best)
 
-    def refined_again(k: int, picture: Picture) -> None:
-        low, high = np.searchsorted(first.t, [first.t[k] - reach, first.t[k] + reach])
-        rows = range(int(low), min(int(high) + 1, len(first)))
-        part = first.part(rows.start, rows.stop)
-        part = part.with_frames({j - rows.start: better[j] for j in rows if j in better})
-        here = LocalMotion(part, around.interval)
-        frame = _refine_frame(film, picture, k - rows.start, state, here, part)
+
+class Refiner(Observer):
+    """Tracks of a first pass, refined frame by frame."""
+
+    def __init__(
+        self,
+        state: TrackerState,
+        first: Tracks,
+        again: bool,
+        look_at: Callable[[int], DiskAppearance] | None,
+    ) -> None:
+        self.state, self.first, self.again, self.look_at = state, first, again, look_at
+        self.around = LocalMotion(first)
+        self.reach = NEAR * self.around.interval
+        self.better: dict[int, FrameTrack] = {}
+        self.best: dict[int, FrameTrack] = {}  # of those that are fitted once more
+        self.waiting: deque[tuple[int, Corrected, tuple[int, ...]]] = deque()
+        self.next = 0  # number of the next frame
+
+    def look(self, corrected: Corrected, t: float, shape: tuple[int, ...]) -> Pose:
+        """Refine the next frame, and those whose neighbours are all refined by now."""
+        k, first = self.next, self.first
+        self.next += 1
+        if k >= len(first):
+            return NOWHERE
+        state = self.state if self.look_at is None else replace(self.state, look=self.look_at(k))
+        frame = _refined(corrected, shape, k, state, self.around, first)
         if frame is not None:
-            best[k] = frame
+            self.better[k] = frame
+        if self.again and (frame.streak > LONG if frame else first.flag[k] or first.streak[k] > LONG):
+            self.waiting.append((k, corrected, shape))
+        while self.waiting and first.t[k] - first.t[self.waiting[0][0]] > self.reach:
+            self._once_more()
+        return NOWHERE if frame is None else Pose(frame.centre, frame.angle)
 
-    for k, picture in zip(range(len(first)), film.uncorrected(), strict=False):
-        seen = state if look_at is None else replace(state, look=look_at(k))
-        frame = _refine_frame(film, picture, k, seen, around, first)
+    def end(self) -> None:
+        """Refine the frames that still wait."""
+        while self.waiting:
+            self._once_more()
+
+    def _once_more(self) -> None:
+        """Refine the first frame that waits from its refined neighbours."""
+        (k, corrected, shape), t = self.waiting.popleft(), self.first.t
+        low, high = np.searchsorted(t, [t[k] - self.reach, t[k] + self.reach])
+        rows = range(int(low), min(int(high) + 1, len(t)))
+        part = self.first.part(rows.start, rows.stop)
+        part = part.with_frames({j - rows.start: self.better[j] for j in rows if j in self.better})
+        here = LocalMotion(part, self.around.interval)
+        frame = _refined(corrected, shape, k - rows.start, self.state, here, part)
         if frame is not None:
-            better[k] = frame
-        if again and (frame.streak > LONG if frame else first.flag[k] or first.streak[k] > LONG):
-            waiting.append((k, picture))
-        while waiting and first.t[k] - first.t[waiting[0][0]] > reach:
-            refined_again(*waiting.popleft())
-        tick(picture.index)
-    while waiting:
-        refined_again(*waiting.popleft())
-    return first.with_frames(better | best)
+            self.best[k] = frame
 
 
-def _refine_frame(
-    film: Film, picture: Picture, k: int, state: TrackerState, around: LocalMotion, tracks: Tracks
+def _refined(
+    corrected: Corrected,
+    shape: tuple[int, ...],
+    k: int,
+    state: TrackerState,
+    around: LocalMotion,
+    tracks: Tracks,
 ) -> FrameTrack | None:
+    """Return a frame fitted from what its neighbours say; None if it does not hold."""
     if tracks.flag[k] and not is_lost(tracks.flag[k]):
         return None
     here = around.at(k)
@@ -107,7 +116,7 @@ def _refine_frame(
     motion = here.motion(state.exposure)
     pose = Pose(here.pose.centre, here.pose.angle)
     streak = state.look.streak(motion)
-    part = film.corrected(picture, state.box([pose], streak, picture.y.shape))
+    part = corrected(state.box([pose], streak, shape))
     fit = fit_and_check(part, state, pose, motion, KNOWN if here.tracked else FORESEEN)
     if fit is None:
         return None
@@ -117,14 +126,6 @@ def _refine_frame(
     if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.tracked:
         return None  # two pale streaks agree with much
     return found_in(float(tracks.t[k]), fit, pose, streak, "refined")
-
-
-def weak(tracks: Tracks) -> NDArray[np.bool_]:
-    """Frames with long streaks of too few marks, or of marks that disagree."""
-    used = np.array([np.isfinite(c).sum() for c in tracks.chi2])
-    off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.residuals])
-    long = tracks.streak > LONG
-    return np.asarray(long & ((used < WEAK_MARKS) | (off > WEAK_OFF + 0.03 * tracks.streak)))
 
 
 def drop_weak(tracks: Tracks) -> Tracks:
@@ -141,84 +142,3 @@ def drop_weak(tracks: Tracks) -> Tracks:
             if not tracks.flag[k]
         }
     )
-
-
-def interpolation_error(tracks: Tracks, variance: float) -> Array:
-    """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
-
-    A streak shows the mean of its path. The distance from its middle is half the second derivative times the
-    variance of the time [s^2] of the exposure. The polynomials that tell this derivative do not know
-    what happens between frames; how far they miss the frame itself when it is left out shows how much.
-    """
-    around = LocalMotion(tracks)
-    factor = 0.5 * JUMP * variance / around.interval**2
-    missed = [around.leave_one_out_residual(k) for k in range(len(tracks))]
-    return factor * np.array([(centre.real, centre.imag, angle) for centre, angle in missed])
-
-
-def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array:
-    """Covariances (n, 3, 3) of poses in the middle of paths whose bending poses with those errors told.
-
-    The distance of a path's mean from its middle, half the second derivative times `variance` [s^2], is
-    subtracted. That derivative has the errors of the frame itself, against the sign, and of its neighbours:
-    of a
-    shutter that is open all the time they make the pose worse by a tenth.
-    """
-    around, out = LocalMotion(tracks), covariance.copy()
-    good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
-    for k in np.flatnonzero(good):
-        rows, weights = around.bending(int(k))
-        if good[rows].all():
-            share = (rows == k) - 0.5 * variance * weights
-            out[k] = np.einsum("j,jab->ab", share**2, covariance[rows])
-    return out
-
-
-class LocalMotion:
-    """A first pass, to be looked at around each of its frames."""
-
-    def __init__(self, tracks: Tracks, interval: float | None = None) -> None:
-        self.t = tracks.t
-        self.centre, self.angle = tracks.centre, tracks.angle
-        self.good = np.flatnonzero(np.isfinite(self.angle) & ~weak(tracks))
-        usual = usual_interval(self.t) if len(self.t) > 1 else 1.0
-        self.interval = usual if interval is None else interval
-
-    def _neighbours(self, k: int) -> tuple[NDArray[np.intp], Array, bool]:
-        """Return the nearest frames on both sides, their distances in intervals, and True if k is tracked."""
-        place = int(np.searchsorted(self.good, k))
-        tracked = place < len(self.good) and bool(self.good[place] == k)
-        low, high = max(0, place - EACH_SIDE), place + EACH_SIDE + tracked
-        rows = self.good[low:high]
-        x = (self.t[rows] - self.t[k]) / self.interval
-        return rows[np.abs(x) < NEAR], x[np.abs(x) < NEAR], tracked
-
-    def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
-        """Return how centre and angle differ from the neighbours' prediction; 0 if these are too few."""
-        rows, x, _ = self._neighbours(k)
-        others = rows != k
-        if others.all() or others.sum() < 2:
-            return 0j, 0.0
-        rows, x = rows[others], x[others]
-        weights = np.linalg.inv(np.vander(x, len(x), increasing=True))[0]
-        centre, angle = weights @ self.centre[rows], weights @ self.angle[rows]
-        return complex(self.centre[k] - centre), float(self.angle[k] - angle)
-
-    def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
-        """Frames that tell the second derivative at a frame that is tracked, and their weights [1 / s^2]."""
-        rows, x, tracked = self._neighbours(k)
-        if len(rows) < 3 or not tracked:
-            return np.array([k]), np.zeros(1)
-        return rows, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
-
-    def at(self, k: int) -> Local | None:
-        """Polynomials through the nearest poses on both sides; None where too few are near."""
-        rows, x, tracked = self._neighbours(k)
-        if len(rows) < 3 or (not tracked and not (x.min() < 0 < x.max())):
-            return None
-        powers = np.linalg.inv(np.vander(x, len(x), increasing=True))[:3]
-        c, a = powers @ self.centre[rows], powers @ self.angle[rows]
-        place, angle = (self.centre[k], self.angle[k]) if tracked else (c[0], a[0])
-        pose, h = Pose(complex(place), float(angle)), self.interval
-        rate, bend = complex(c[1]) / h, 2 * complex(c[2]) / h**2
-        return Local(pose, rate, float(a[1]) / h, bend, 2 * float(a[2]) / h**2, tracked)
