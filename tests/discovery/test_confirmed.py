@@ -78,7 +78,7 @@ def test_a_trial_that_held_out_frames_do_not_confirm_is_not_accepted(monkeypatch
     monkeypatch.setattr("udd.discovery.acceptance.confirmed_by", lambda *_: ((0.9, 0.8, 1.02), witness))
     result = tests.best(SearchState(part, whole, tests.errors(part)), trials, scores)
     assert (result is not None) == (witness is not None)
-    assert result is None or result[0].witness == witness
+    assert result is None or result[0].result.witness == witness
 
 
 def test_an_interval_that_reaches_one_confirms_only_where_noise_hides_the_gain():

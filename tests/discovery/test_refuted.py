@@ -72,8 +72,7 @@ SCORES: Any = SimpleNamespace(library=None)
         ((0.4, 0.3, 0.6), "curve"),
     ],
 )
-def test_a_refuted_hypothesis_leaves_room_for_the_next(monkeypatch, curve_ratio, expected):
-    monkeypatch.setattr("udd.discovery.acceptance.log_evidence", lambda *_a: 0.0)
+def test_a_refuted_hypothesis_leaves_room_for_the_next(curve_ratio, expected):
     rows = {"curve": (3000.0, curve_ratio), "drag": (2700.0, (0.2, 0.1, 0.3))}
     added = Table(rows).best(CURRENT, [trial("curve", curve="friction"), trial("drag")], SCORES)
     assert (added and added[0].candidates[0].title) == expected
@@ -84,7 +83,7 @@ def test_all_refuted_hypotheses_add_nothing():
     assert Table(rows).best(CURRENT, [trial("curve", curve="friction"), trial("drag")], SCORES) is None
 
 
-def test_a_refuted_formula_takes_its_curve_with_it(monkeypatch):
+def test_a_refuted_formula_takes_its_curve_with_it():
     """Formulas come from the curve of the fit of all data, not from a trial's."""
 
     class Written(Table):
@@ -92,7 +91,6 @@ def test_a_refuted_formula_takes_its_curve_with_it(monkeypatch):
             formulas = [trial("formula", curve=t.curve.name[0]) for t in trials if t.curve]
             return super().hypotheses(current, [*trials, *formulas], scores)
 
-    monkeypatch.setattr("udd.discovery.acceptance.log_evidence", lambda *_a: 0.0)
     refuted, confirmed = (17.0, 11.0, 23.0), (0.2, 0.1, 0.3)
     rows = {"formula": (3000.0, refuted), "curve": (2900.0, refuted), "drag": (2700.0, confirmed)}
     added = Written(rows).best(CURRENT, [trial("curve", curve="friction"), trial("drag")], SCORES)

@@ -56,47 +56,6 @@ _COMPARED = 12  # maximum of forms that are compared on all data
 
 
 @dataclass(frozen=True)
-class Step:
-    """Accepted addition: one candidate, two together, or a curve.
-
-    Attributes
-    ----------
-    candidates : list of Candidate
-    curve : Curve or None
-        The located curve, if it was added or has a formula.
-    chi2, p : float
-        Decrease in chi2, and the probability of that by chance.
-    ratio : tuple of float
-        Cost of the held-out frames after over before, with its 95 % interval.
-    witness : {"held", "fitted", "halves"}
-        Test that confirms it, see :func:`udd.discovery.validation.confirmation.confirmed_by`.
-    alternatives : list of Alternative
-    formula : Formula or None
-        Formula of the curve.
-    names : list of str
-        Parameters that it adds.
-    cost : float
-        Cost in its log evidence, nats, of a spline's freedom and of its prior.
-    """
-
-    candidates: list[Candidate]
-    curve: Curve | None
-    chi2: float
-    p: float
-    ratio: Ratio
-    witness: Confirmation
-    alternatives: list[Alternative]
-    formula: Formula | None
-    names: list[str]
-    cost: float
-
-    @property
-    def is_curve(self) -> bool:
-        """True for a curve without a formula."""
-        return self.curve is not None and self.formula is None
-
-
-@dataclass(frozen=True)
 class SearchState:
     """State of the search: fits of the training part and of all data, and held-out errors.
 
@@ -138,8 +97,13 @@ class TestResult:
     ----------
     whole : Fit
         Fit of all data.
-    chi2, p, ratio, witness
-        As in :class:`Step`; a trial that chance explains is not tested for confirmation.
+    chi2, p : float
+        Decrease in chi2, and the probability of that by chance.
+    ratio : tuple of float
+        Cost of the held-out frames after over before, with its 95 % interval.
+    witness : {"held", "fitted", "halves"} or None
+        Test that confirms it, see :func:`udd.discovery.validation.confirmation.confirmed_by`. A trial that
+        chance explains is not tested.
     drifts : bool
         True if a slow drift of the sensor's zero would explain more.
     """
@@ -150,6 +114,25 @@ class TestResult:
     ratio: Ratio
     witness: Confirmation | None
     drifts: bool = False
+
+
+@dataclass(frozen=True)
+class Step:
+    """Accepted addition: a hypothesis with its test results, and its rivals."""
+
+    chosen: Hypothesis
+    result: TestResult
+    alternatives: list[Alternative]
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """The added candidate, two together, or a curve."""
+        return self.chosen.trial.candidates
+
+    @property
+    def curve(self) -> Curve | None:
+        """The located curve, if it was added or has a formula."""
+        return self.chosen.trial.curve
 
 
 def _fitted_to(whole: Fit, trial: TrialFit) -> TrialFit | None:
@@ -218,7 +201,7 @@ class Acceptance:
                     continue
                 errors = self.errors_or_none(chosen.trial.fit) if judged.witness else None
                 if judged.witness and errors is not None and not self.worse(current.errors, errors):
-                    step = self._step(chosen, judged, judged.witness, order, scores.library)
+                    step = Step(chosen, judged, self._alternatives(chosen, order, scores.library))
                     return step, SearchState(chosen.trial.fit, judged.whole, errors)
                 if judged.witness or judged.ratio[1] > 1.0:
                     refuted.append(chosen.trial)
@@ -232,32 +215,11 @@ class Acceptance:
             ]
         return None
 
-    def _step(
-        self,
-        chosen: Hypothesis,
-        judged: TestResult,
-        witness: Confirmation,
-        order: Sequence[Hypothesis],
-        scanned: Scan,
-    ) -> Step:
-        """Describe an accepted hypothesis, with its rivals among the others."""
-        return Step(
-            candidates=chosen.trial.candidates,
-            curve=chosen.trial.curve,
-            chi2=judged.chi2,
-            p=judged.p,
-            ratio=judged.ratio,
-            witness=witness,
-            alternatives=self._alternatives(chosen, order, scanned),
-            formula=chosen.trial.formula,
-            names=chosen.trial.names,
-            cost=log_evidence(chosen.whole, chosen.again.names) - chosen.log_z,
-        )
-
     def log_evidence(self, fitted: Fit, steps: Sequence[Step]) -> float:
         """Compute the log evidence of a fit of all data after these steps, with their priors."""
-        names = [name for step in steps for name in step.names]
-        cost = sum(step.cost for step in steps)
+        chosen = [step.chosen for step in steps]
+        names = [name for h in chosen for name in h.trial.names]
+        cost = sum(log_evidence(h.whole, h.again.names) - h.log_z for h in chosen)
         return log_evidence(self._at_own_noise(fitted), names) - cost
 
     def hypotheses(
@@ -338,7 +300,7 @@ class Acceptance:
 
     def _formulas(self, fitted: Fit, curve: Curve) -> list[Formula]:
         taken, number = fitted.model.state_names, fitted.observations
-        formulas = formulas_for(curve, number, taken=taken).formulas[:_FORMULAS]
+        formulas = formulas_for(curve, number, taken=taken)[:_FORMULAS]
         name = curve.coordinates[0].name
         # The library has powers of the speed.
         if len(curve.coordinates) > 1 or name in (curve.slot.equation, f"|{curve.slot.equation}|"):

@@ -454,7 +454,8 @@ def _title(candidate: Candidate, fitted: Effect) -> str:
 
 def _describe(step: Step, final: Fit) -> list[AddedEffect]:
     """Describe the effects of a step, with the numbers of the fit to all data."""
-    result = []
+    result, tests, formula = [], step.result, step.chosen.trial.formula
+    assert tests.witness is not None
     for candidate in step.candidates:
         effect = next(e for e in final.model.effects if e.name == candidate.effect.name)
         names = {p: f"{effect.name}.{p}" for p in effect.parameters}
@@ -466,12 +467,12 @@ def _describe(step: Step, final: Fit) -> list[AddedEffect]:
                 expression=effect.expression,
                 parameters=dict(effect.parameters),
                 errors={p: final.errors[name] for p, name in names.items() if name in final.errors},
-                chi2=step.chi2,
-                p=step.p,
-                ratio=step.ratio,
-                witness=step.witness,
+                chi2=tests.chi2,
+                p=tests.p,
+                ratio=tests.ratio,
+                witness=tests.witness,
                 curve=step.curve,
-                is_law=step.curve is None or (step.formula is not None and is_single_term(step.formula.node)),
+                is_law=step.curve is None or (formula is not None and is_single_term(formula.node)),
                 tried=candidate.title,
             )
         )

@@ -139,6 +139,7 @@ class Proposals:
         names = {t.candidates[0].effect.name for t in tried}
         others = [s.candidate for s in self.scores.library.scored if s.candidate.effect.name not in names]
         best = min(tried, key=lambda t: t.rank)
+        # ODEBench 57: otherwise a wrong formula is identified in place of the decay of z.
         similar = look_alikes(self.fit.model, best.fit, others)[:_ALIKE]
         self.clock.trying([candidate.title for candidate, _amplitude in similar])
         some = [(candidate, [amplitude]) for candidate, amplitude in similar]

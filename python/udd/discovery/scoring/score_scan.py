@@ -28,7 +28,7 @@ from .term_library import waves
 _ABSORBED = 1e-4
 _ALIKE = 1e6  # condition number of the information above which candidates are not distinguishable
 _STRONG = 4.0  # factor on the usual amplitudes, for effects that may have either sign
-_WAVES = 100  # scored at a time, to limit the memory for a long record
+_FORCINGS = 100  # scored at a time, to limit the memory for a long record
 _AT_ONCE = 20_000  # evaluated together: some ten megabytes
 _MOST_PAIRS = 700_000  # evaluated in all: a few seconds
 _LINES = 24  # strongest lines of a frequency scan, whose neighbourhoods are scanned too
@@ -191,16 +191,26 @@ def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
     there = {effect.name for effect in model.effects}
     candidates = [c for c in waves(model, frequencies) if c.effect.name not in there]
     by_name = {slot.name: slot for slot in slots(model)}
+
+    def column(candidate: Candidate) -> NDArray[np.float64]:
+        phase = 2 * np.pi * candidate.effect.values[-1] * moved.t
+        value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+        return moved.columns(by_name[candidate.effect.slots[0]], value, np.zeros(value.shape))
+
+    return scored_forcings(fit, candidates, column)
+
+
+def scored_forcings(
+    fit: Fit, candidates: Sequence[Candidate], column: Callable[[Candidate], NDArray[np.float64] | None]
+) -> list[Scored]:
+    """Score candidates by their forcings, as `column` computes them; it returns None for an undefined one."""
     scatter = max(fit.scatter, 1.0)
     result: list[Scored] = []
-    for first in range(0, len(candidates), _WAVES):
-        some, columns = candidates[first : first + _WAVES], []
-        for candidate in some:
-            phase = 2 * np.pi * candidate.effect.values[-1] * moved.t
-            slot = by_name[candidate.effect.slots[0]]
-            value = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
-            columns.append(moved.columns(slot, value, np.zeros(value.shape)))
-        for candidate, score in zip(some, score_forcings(fit, columns), strict=True):
+    for first in range(0, len(candidates), _FORCINGS):
+        columns = [(c, column(c)) for c in candidates[first : first + _FORCINGS]]
+        usable = [(c, values) for c, values in columns if values is not None]
+        scores = score_forcings(fit, [values for _c, values in usable])
+        for (candidate, _values), score in zip(usable, scores, strict=True):
             gradient, information, alone = (
                 scatter * part for part in (score.gradient, score.information, score.alone)
             )

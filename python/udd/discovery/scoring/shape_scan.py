@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
-from udd.effects import Effect
 from udd.errors import ModelError
 from udd.fitting import Fit
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
-from .forcing import Responses, responses, score_forcings
+from .forcing import Responses, responses
 from .friction_terms import DURATIONS, POWERS, frictions, further, places, speeds
-from .score_scan import Scored, score_of
+from .score_scan import Scored, scored_forcings
 
 Array = NDArray[np.float64]
-
-_AT_ONCE = 100  # scored at a time, to limit the memory for a long record
 
 
 def strongest_shapes(fit: Fit) -> tuple[list[Scored], int]:
@@ -39,7 +37,7 @@ def strongest_shapes(fit: Fit) -> tuple[list[Scored], int]:
     moved = responses(fit)
     strongest, number = [], 0
     for listed in _candidates(fit):
-        some = _scored(fit, moved, listed)
+        some = scored_forcings(fit, listed, partial(_column, moved))
         number += len(some)
         strongest += _best(some)
     return strongest, number
@@ -97,25 +95,9 @@ def _values(along: str, model: Model, states: Array, duration: float, width: flo
     return places(states[:, model.state_names.index(model.angles[0])], width, angle=True)
 
 
-def _scored(fit: Fit, moved: Responses, listed: Sequence[Candidate]) -> list[Scored]:
-    """Score candidates of one effect, which differ only in its shapes."""
-    scatter, result = max(fit.scatter, 1.0), []
-    for first in range(0, len(listed), _AT_ONCE):
-        columns = [
-            (candidate, _column(moved, candidate.effect)) for candidate in listed[first : first + _AT_ONCE]
-        ]
-        usable = [(candidate, column) for candidate, column in columns if column is not None]
-        scores = score_forcings(fit, [column for _one, column in usable])
-        for (candidate, _column_of), score in zip(usable, scores, strict=True):
-            gradient, information, alone = (
-                scatter * part for part in (score.gradient, score.information, score.alone)
-            )
-            result.append(score_of(candidate, gradient, information, alone, scatter))
-    return result
-
-
-def _column(moved: Responses, effect: Effect) -> Array | None:
+def _column(moved: Responses, candidate: Candidate) -> Array | None:
     """Return the change of the state at every link's end by a unit amplitude, (n, d, 1), or None."""
+    effect = candidate.effect
     (name,) = effect.amplitudes
     added = np.zeros(moved.states.shape)
     for model, film in zip(moved.fit.models, moved.films, strict=True):

@@ -70,19 +70,19 @@ def _read_fixed(text: str) -> tuple[Node, list[float]]:
     return read(text, fixed)
 
 
-def regression(curve: Curve, most: int, seed: int) -> tuple[list[tuple[Node, list[float]]], str]:
-    """Run symbolic regression with at most so many constants; also return why it could not run."""
+def regression(curve: Curve, most: int, seed: int) -> list[tuple[Node, list[float]]]:
+    """Run symbolic regression with at most so many constants; return nothing if pyoperon is not installed."""
     if curve.splines[0].periodic:
-        return [], ""  # a formula of an angle must be periodic, as waves and bumps are
+        return []  # a formula of an angle must be periodic, as waves and bumps are
     try:
         from pyoperon.sklearn import SymbolicRegressor
     except ImportError:
-        return [], "symbolic regression was not tried: it needs pip install udd[formula]"
+        return []
     x = _sample(curve)
     y = curve.values(x)
     wide, size = float(np.abs(x).max()), float(y.std())
     if size == 0.0:
-        return [], ""
+        return []
     regressor = SymbolicRegressor(
         allowed_symbols="add,sub,mul,div,exp,tanh,sin,abs,square,constant,variable",
         objectives=["mse", "length"],
@@ -107,7 +107,7 @@ def regression(curve: Curve, most: int, seed: int) -> tuple[list[tuple[Node, lis
         node = simplify(scaled(("*", ("c", len(values) - 1), node), wide, values), values)
         if 0 < len(constants(node)) <= most:
             result.append((node, values))
-    return result, ""
+    return result
 
 
 def _sample(curve: Curve) -> Array:

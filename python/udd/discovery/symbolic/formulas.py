@@ -79,27 +79,10 @@ class Formula:
         return evaluate(self.node, np.asarray(x, dtype=np.float64), list(self.parameters.values()))
 
 
-@dataclass(frozen=True)
-class Formulas:
-    """Formulas that may have generated a curve.
-
-    Attributes
-    ----------
-    formulas : list of Formula
-        The most probable first.
-    identified : bool
-        True if the first is at most 10 nats less probable than the curve.
-    note : str
-        Methods that could not be tried; else empty.
-    """
-
-    formulas: list[Formula]
-    identified: bool
-    note: str
-
-
-def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collection[str] = ()) -> Formulas:
-    """Search short formulas for a curve of one coordinate.
+def formulas_for(
+    curve: Curve, observations: int, seed: int = 0, taken: Collection[str] = ()
+) -> list[Formula]:
+    """Search short formulas for a curve of one coordinate, the most probable first; none for a surface.
 
     Usual forms (powers, steps, bumps, waves) and those from symbolic regression (pyoperon, if installed) are
     fitted to the curve's coefficients with their full information, which accounts for confounding with the
@@ -117,9 +100,9 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
         Names that constants may not have: those of a model's states.
     """
     if len(curve.coordinates) != 1:
-        return Formulas([], False, "no formula is sought for a surface")
+        return []
     target = _Target(curve, observations)
-    regressed, note = regression(curve, _MOST_CONSTANTS, seed)
+    regressed = regression(curve, _MOST_CONSTANTS, seed)
     trials = []
     for node, values in itertools.chain(usual(curve), regressed):
         node = simplify(without_sign(node) if curve.coordinates[0].name in _POSITIVE else node, values)
@@ -132,11 +115,7 @@ def formulas_for(curve: Curve, observations: int, seed: int = 0, taken: Collecti
     free = [name for name in _NAMES if name not in taken]
     formulas = [_formula(curve, candidate, free) for candidate in ranked]
     best = max((candidate.nats for candidate in formulas), default=-math.inf)
-    return Formulas(
-        [candidate for candidate in formulas if candidate.nats > best - EVIDENCE_MARGIN],
-        best > -EVIDENCE_MARGIN,
-        note,
-    )
+    return [candidate for candidate in formulas if candidate.nats > best - EVIDENCE_MARGIN]
 
 
 def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> Formula | None:
