@@ -349,10 +349,9 @@ impl<const D: usize> FormulaFamily<D> {
     ///
     /// # Panics
     /// Where a record has another number of inputs than the model, or the model has more than [`MAX_INPUTS`].
-    pub fn with_records(mut self, records: Vec<Signals>, record: usize) -> Self {
+    pub fn set_records(&mut self, records: Vec<Signals>, record: usize) {
         assert!(self.inputs <= MAX_INPUTS && records.iter().all(|record| record.len() == self.inputs));
         (self.records, self.record) = (records.into(), record);
-        self
     }
 
     /// These of its states are angles.

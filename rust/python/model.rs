@@ -81,6 +81,21 @@ macro_rules! with_wide_model {
 }
 pub(crate) use with_wide_model;
 
+/// Runs the expression with the family and the values of a model given as text, whatever its number of states; the other
+/// expression for a compiled model.
+macro_rules! with_formula {
+    ($model:expr, |$family:ident, $values:ident| $body:expr $(, else $other:expr)?) => {
+        match $model {
+            AnyModel::Two(Either::Second($family), $values) => $body,
+            AnyModel::Three(Either::Second($family), $values) => $body,
+            AnyModel::Four(Either::Second($family), $values) => $body,
+            AnyModel::Six($family, $values) => $body,
+            AnyModel::Twelve($family, $values) => $body,
+            _ => { $($other)? }
+        }
+    };
+}
+
 /// The kinds of models that are compiled, beside the user's own; `udd.models` has a file of that name for each.
 const KINDS: [&str; 3] = ["dle", "disk", "pendulum"];
 
@@ -219,17 +234,9 @@ impl AnyModel {
         ModelError::new_err("friction with the treatment lugre is for udd.simulate; here take set-valued")
     }
 
-    /// Whether it is the user's own.
+    /// Returns true for a model given as text.
     pub fn is_own(&self) -> bool {
-        use AnyModel::{Four, Six, Three, Twelve, Two};
-        matches!(
-            self,
-            Two(Either::Second(_), _)
-                | Three(Either::Second(_), _)
-                | Four(Either::Second(_), _)
-                | Six(..)
-                | Twelve(..)
-        )
+        with_formula!(self, |_family, _values| true, else false)
     }
 
     /// The parameter values.
@@ -286,7 +293,7 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
     let FormulaModelSpec { states, equations, parameters, angles, inputs, delays, records, record, observe } =
         spec;
     let texts = [states, equations, parameters, angles, inputs].map(Clone::clone);
-    let model = LATEST.get((texts.to_vec(), observe.clone()), || own_law(spec))?;
+    let mut model = LATEST.get((texts.to_vec(), observe.clone()), || own_law(spec))?;
     let delay =
         |name: &Option<String>| name.as_ref().and_then(|name| parameters.iter().position(|p| p == name));
     let delays: Vec<Option<usize>> = delays.iter().map(delay).collect();
@@ -298,19 +305,11 @@ fn own(spec: &FormulaModelSpec<'_>, values: Vec<f64>) -> PyResult<AnyModel> {
         let own = record.iter().zip(&delays).map(|(signal, &delay)| signal.read(delay));
         signals.push(Signals::new(own.collect::<PyResult<_>>()?));
     }
-    use AnyModel::{Four, Six, Three, Twelve, Two};
-    Ok(match model {
-        Two(Either::Second(family), _) => Two(Either::Second(family.with_records(signals, *record)), values),
-        Three(Either::Second(family), _) => {
-            Three(Either::Second(family.with_records(signals, *record)), values)
-        }
-        Four(Either::Second(family), _) => {
-            Four(Either::Second(family.with_records(signals, *record)), values)
-        }
-        Six(family, _) => Six(family.with_records(signals, *record), values),
-        Twelve(family, _) => Twelve(family.with_records(signals, *record), values),
-        other => other,
-    })
+    with_formula!(&mut model, |family, numbers| {
+        family.set_records(signals, *record);
+        *numbers = values;
+    });
+    Ok(model)
 }
 
 /// The same without values and records.
