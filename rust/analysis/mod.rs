@@ -2,6 +2,7 @@
 
 pub mod batch;
 mod ensemble;
+mod growth;
 mod jacobian;
 mod lyapunov;
 mod periodic_schur;
@@ -19,6 +20,7 @@ pub use batch::scheduler::{
 };
 pub use batch::series_family::SeriesFamily;
 pub use ensemble::{Ensemble, EnsembleRun, MethodChoice};
+pub use growth::growing_components;
 pub use jacobian::{Linearisation, higher, linear};
 pub use lyapunov::block_average::{Average, BlockAverages};
 pub use lyapunov::covariant::{CovariantFrames, frames};

@@ -6,6 +6,7 @@ mod errors;
 mod estimate;
 mod fitted;
 mod formula;
+mod growth;
 mod image;
 mod interrupt;
 mod jobs;
@@ -31,6 +32,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     effects::register(module)?;
     model::register(module)?;
     formula::register(module)?;
+    growth::register(module)?;
     simulate::register(module)?;
     lyapunov::register(module)?;
     section::register(module)?;

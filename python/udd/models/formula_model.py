@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -170,6 +171,7 @@ class FormulaModel(Model, written=True):
     def _set(self, **fields: Any) -> None:
         for name, value in fields.items():
             object.__setattr__(self, name, value)
+        vars(self).pop("_own", None)
 
     def _with(self, **fields: Any) -> Self:
         """Return a copy with other fields, unchecked."""
@@ -341,7 +343,7 @@ class FormulaModel(Model, written=True):
         """Return the core's description of the model; its equations contain the effects."""
         return self.kind, list(self.parameters.values()), [], False
 
-    @property
+    @cached_property
     def _own(self) -> FormulaText:
         """Return the core's description without the values."""
         texts = dict(self.equations)

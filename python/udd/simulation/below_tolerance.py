@@ -17,7 +17,6 @@ __all__ = ["growing_components", "warn_from", "warn_of", "warn_of_some"]
 
 _Floats = NDArray[np.float64]
 
-_VANISHES = 1e-9  # a rate that falls by this factor with its component is proportional to it
 _RETURNS = 1e4  # times atol, and
 _LARGE = 1e-3  # of its largest value: a component above both matters again
 _CHANGES = 0.01  # relative change of a component that shows
@@ -33,14 +32,8 @@ def growing_components(model: Model, size: _Floats, t: float = 0.0) -> NDArray[n
     """
     if not model.profile.written or model.inputs:
         return np.zeros(0, dtype=np.intp)
-    each = np.arange(len(size))
-    # All at once: the probes, and for each component the probes with that one at zero.
-    rows = np.repeat((np.where(size > 0.0, size, 1.0) * _parts(len(size)))[None], len(size) + 1, axis=0)
-    rows[each + 1, :, each] = 0.0
-    rates = np.abs(model.rates(t, rows))
-    usual, without = rates[0].T, rates[each + 1, :, each]
-    vanishes = np.isfinite(usual) & (without <= _VANISHES * usual)
-    return np.flatnonzero(vanishes.all(axis=1) & usual.any(axis=1))
+    probes = np.where(size > 0.0, size, 1.0) * _parts(len(size))
+    return np.array(_core.growing_components(model, t, probes.ravel()), dtype=np.intp)
 
 
 @cache
