@@ -167,6 +167,19 @@ impl Program {
         self.leaves.iter().any(|leaf| matches!(leaf, Leaf::Rate(_)))
     }
 
+    /// Returns true if all operations, but those on parameters alone, are sums, products and choices by sides: numbers with
+    /// derivatives then have the values of plain numbers, to the last bit.
+    pub fn is_ring(&self) -> bool {
+        self.steps.iter().all(|step| match step.action {
+            Action::Add | Action::Sub | Action::Mul | Action::Neg | Action::Square => true,
+            Action::MulMul | Action::MulAdd | Action::MulSub | Action::SubMul | Action::SubMulMul => true,
+            Action::MulAddMul | Action::MulSubMul | Action::SquareAdd => true,
+            Action::Select(_) | Action::Turn(_) | Action::Sign(_) => true,
+            Action::Div | Action::Unary(_) | Action::Binary(_) | Action::Where => false,
+            Action::Compared(..) | Action::Defined | Action::Spline(_) => false,
+        })
+    }
+
     /// Computes the values that depend on parameters alone, for [`run`](Program::run): all registers as a run begins with
     /// them.
     ///

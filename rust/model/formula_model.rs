@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::sliding_mode::{self, SlidingSurface};
+use super::steady_surfaces::{Places, SteadySurfaces};
 use super::{
     EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Probes, Sides, Signals,
     StepStart, System, TARGETS, choose, enclosed, parameter, sides_of, suspect_in_turn,
@@ -24,6 +25,7 @@ struct Law {
     /// The rates with comparisons in place of surfaces.
     written: Program,
     surfaces: Vec<Program>,
+    steady: SteadySurfaces,
     /// The components of the state that the surfaces depend on.
     watched: Vec<bool>,
     kinks: Kinks,
@@ -37,7 +39,8 @@ impl Law {
         let takes = |n: usize| kinks.surfaces.iter().any(|own| own.ops().contains(&Op::Push(Leaf::State(n))));
         let watched = (0..equations.len()).map(|n| slides || takes(n)).collect();
         let number = Number(LAWS.fetch_add(1, Ordering::Relaxed));
-        Self { number, rates: Program::of(equations), written, surfaces, watched, kinks }
+        let steady = SteadySurfaces::of(&kinks);
+        Self { number, rates: Program::of(equations), written, surfaces, steady, watched, kinks }
     }
 }
 
@@ -72,6 +75,8 @@ pub struct Own<S, const D: usize> {
     /// The part of the rates, and of each surface, that the parameters determine.
     fixed: Vec<S>,
     fixed_surfaces: Vec<Vec<S>>,
+    /// The same of all steady surfaces, for places side by side.
+    fixed_places: Vec<Places>,
     sliding: Vec<SlidingSurface<S>>,
     inputs: InputValues<S>,
 }
@@ -138,6 +143,7 @@ impl<S: Scalar, const D: usize> Own<S, D> {
             law: self.law.clone(),
             fixed: all(&self.fixed),
             fixed_surfaces: self.fixed_surfaces.iter().map(|own| all(own)).collect(),
+            fixed_places: Vec::new(),
             sliding: self.sliding.iter().map(sliding).collect(),
             inputs: match &self.inputs {
                 InputValues::None => InputValues::None,
@@ -265,7 +271,20 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         probes: &Probes<'_, S::Real, D>,
         found: &mut [S::Mask; TARGETS],
     ) {
-        suspect_in_turn(self, at, wall, probes, found);
+        let slides = |own: &SlidingSurface<S>| own.slides(&at.sides).any();
+        if self.fixed_places.is_empty() || self.sliding.iter().any(slides) {
+            return suspect_in_turn(self, at, wall, probes, found);
+        }
+        self.law.steady.suspect(&self.fixed_places, at, probes, &self.law.watched, found);
+        for (&steady, found) in self.law.kinks.steady.iter().zip(&mut *found) {
+            if !steady {
+                *found = S::mask(true);
+            }
+        }
+        // The surfaces between sliding and not keep their negative values.
+        for own in &self.sliding {
+            found[own.mode] = at.sides[own.mode];
+        }
     }
 
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
@@ -388,6 +407,10 @@ impl<const D: usize> FormulaFamily<D> {
         Own {
             fixed: law.rates.fix(values),
             fixed_surfaces: law.surfaces.iter().map(|own| own.fix(values)).collect(),
+            fixed_places: match inputs {
+                InputValues::None => law.steady.fix(values),
+                _ => Vec::new(),
+            },
             sliding: sliding_surfaces(&law, D, values),
             law,
             inputs,

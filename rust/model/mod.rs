@@ -16,6 +16,7 @@ mod lugre;
 mod observation;
 mod pendulum;
 mod sliding_mode;
+mod steady_surfaces;
 pub mod stick_slip;
 mod targets;
 

@@ -85,35 +85,43 @@ where
         }
         let parts = &probes.parts[..places];
         let mut values = [S::Real::zero(); MOST_PROBES];
-        let mut beyond = S::mask(false);
         for i in 0..places {
             let x = vector!(S, D; n => S::lift(probes.states[i][n]));
             values[i] = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
-            beyond = beyond.or(values[i].less(S::Real::zero()));
         }
-        if places == MOST_PROBES {
-            // A long step: quarters alone hide zeros of a series that ends. At the start is the straight line through the
-            // next two places.
-            let mut least = values[0].scale(3.0) - values[1];
-            let mut bend = S::Real::zero();
-            for i in 1..MOST_PROBES {
-                least = least.min(values[i - 1] + values[i]);
-                if i % 2 == 0 {
-                    bend = bend.max((values[i] - values[i - 1].scale(2.0) + values[i - 2]).abs());
-                }
-            }
-            return beyond.or(bend.scale(CLEAR_SUM).less(least).not());
-        }
-        // A function that is farther from zero than it changes near both ends has no dip.
-        let (a, b, c, d) = (values[0], values[1], values[2], values[3]);
-        let least = a.min(d);
-        let mut doubt = ((a - b).abs() + (c - d).abs()).less(least).not();
-        if doubt.any() {
-            let bend = (a - b.scale(2.0) + c).abs().max((b - c.scale(2.0) + d).abs());
-            doubt = doubt.and(bend.scale(CLEAR).less(least).not());
-        }
-        beyond.or(doubt)
+        crossing(&values, places)
     }
+}
+
+/// The lanes in which a target's function may have a zero, by its values at so many places of a step.
+#[inline(always)]
+pub fn crossing<R: Real>(values: &[R; MOST_PROBES], places: usize) -> R::Mask {
+    let mut beyond = R::mask(false);
+    for value in &values[..places] {
+        beyond = beyond.or(value.less(R::zero()));
+    }
+    if places == MOST_PROBES {
+        // A long step: quarters alone hide zeros of a series that ends. At the start is the straight line through the
+        // next two places.
+        let mut least = values[0].scale(3.0) - values[1];
+        let mut bend = R::zero();
+        for i in 1..MOST_PROBES {
+            least = least.min(values[i - 1] + values[i]);
+            if i % 2 == 0 {
+                bend = bend.max((values[i] - values[i - 1].scale(2.0) + values[i - 2]).abs());
+            }
+        }
+        return beyond.or(bend.scale(CLEAR_SUM).less(least).not());
+    }
+    // A function that is farther from zero than it changes near both ends has no dip.
+    let (a, b, c, d) = (values[0], values[1], values[2], values[3]);
+    let least = a.min(d);
+    let mut doubt = ((a - b).abs() + (c - d).abs()).less(least).not();
+    if doubt.any() {
+        let bend = (a - b.scale(2.0) + c).abs().max((b - c.scale(2.0) + d).abs());
+        doubt = doubt.and(bend.scale(CLEAR).less(least).not());
+    }
+    beyond.or(doubt)
 }
 
 /// Finds the lanes that may cross each target: those beyond it at any of these places, and those that the places leave in
