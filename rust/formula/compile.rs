@@ -30,12 +30,23 @@ impl Compiled {
         if !self.interpreted.is_empty() {
             work[..program.states].copy_from_slice(&x[..program.states]);
         }
+        self.follow(program, x, sides, work);
+    }
+
+    /// Runs the functions and interprets what is between them.
+    #[inline(always)]
+    pub(super) fn follow<S: Scalar>(&self, program: &Program, held: &[S], sides: &Sides<S>, work: &mut [S]) {
         for i in 0..=self.interpreted.len() {
-            self.code.run(i, work, x, sides);
+            self.code.run(i, work, held, sides);
             if let Some(&step) = self.interpreted.get(i) {
                 program.perform(&[step], sides, work);
             }
         }
+    }
+
+    /// Returns true if the interpreter does some of the steps.
+    pub(super) fn is_interrupted(&self) -> bool {
+        !self.interpreted.is_empty()
     }
 }
 
@@ -44,34 +55,26 @@ pub(super) fn compile(program: &Program, isa: Isa, lanes: usize) -> Option<Compi
     if program.steps.len() > MOST_STEPS {
         return None;
     }
-    let list = Listing::new(isa, lanes);
-    let mut writer = Writer { list, states: program.states, kept: [None; REGISTERS], time: 0 };
-    let mut interpreted = Vec::new();
-    writer.begin();
-    for &step in &program.steps {
-        if writer.step(step).is_none() {
-            writer.list.end();
-            writer.begin();
-            interpreted.push(step);
-        }
-    }
-    writer.list.end();
-    Some(Compiled { code: Code::new(writer.list)?, interpreted })
+    let mut writer = Writer::new(Listing::new(isa, lanes), vec![true; program.states]);
+    writer.steps(&program.steps);
+    writer.compiled()
 }
 
 /// Registers for values; the others are for masks, for what is worked on, and for the sign bit.
 const REGISTERS: usize = 12;
-const FIRST: Register = Register(12);
-const SECOND: Register = Register(13);
+pub(super) const FIRST: Register = Register(12);
+pub(super) const SECOND: Register = Register(13);
 const MASK: Register = Register(14);
 const SIGN: Register = Register(15);
 
-struct Writer {
-    list: Listing,
-    states: usize,
+pub(super) struct Writer {
+    pub(super) list: Listing,
+    /// The values, by their numbers, that are in the array `Held`; the others are in the array `Work`.
+    held: Vec<bool>,
     /// The values in registers, and when each was used last.
     kept: [Option<(u16, usize)>; REGISTERS],
     time: usize,
+    interpreted: Vec<Step>,
 }
 
 fn register(i: usize) -> Register {
@@ -79,6 +82,28 @@ fn register(i: usize) -> Register {
 }
 
 impl Writer {
+    pub(super) fn new(list: Listing, held: Vec<bool>) -> Self {
+        let mut writer = Self { list, held, kept: [None; REGISTERS], time: 0, interpreted: Vec::new() };
+        writer.begin();
+        writer
+    }
+
+    /// Writes these steps; the interpreter does some of them between two functions.
+    pub(super) fn steps(&mut self, steps: &[Step]) {
+        for &step in steps {
+            if self.step(step).is_none() {
+                self.list.end();
+                self.begin();
+                self.interpreted.push(step);
+            }
+        }
+    }
+
+    pub(super) fn compiled(mut self) -> Option<Compiled> {
+        self.list.end();
+        Some(Compiled { code: Code::new(self.list)?, interpreted: self.interpreted })
+    }
+
     /// Begins a function.
     fn begin(&mut self) {
         self.kept = [None; REGISTERS];
@@ -87,7 +112,7 @@ impl Writer {
     }
 
     /// A value in its register, or in its place in memory.
-    fn operand(&mut self, value: u16) -> Operand {
+    pub(super) fn operand(&mut self, value: u16) -> Operand {
         self.time += 1;
         for (i, kept) in self.kept.iter_mut().enumerate() {
             if let Some((other, used)) = kept
@@ -98,7 +123,8 @@ impl Writer {
             }
         }
         let value = usize::from(value);
-        Place(if value < self.states { Array::Held } else { Array::Work }, value).into()
+        let held = self.held.get(value).is_some_and(|&held| held);
+        Place(if held { Array::Held } else { Array::Work }, value).into()
     }
 
     /// A value in its register, or loaded into this one.
@@ -133,11 +159,24 @@ impl Writer {
     /// The code of a step; `None` if it has to be interpreted.
     fn step(&mut self, step: Step) -> Option<()> {
         let (operation, a, b) = self.until_last(step)?;
-        // The operands may be in this register: it is written last.
-        let to = self.room(step.to);
-        self.list.apply(operation, to, a, b);
-        self.list.store(Place(Array::Work, usize::from(step.to)), to);
+        self.write(step.to, operation, a, b);
         Some(())
+    }
+
+    /// Stores `a . b` as a value, which stays in a register, too.
+    pub(super) fn write(&mut self, value: u16, operation: Operation, a: Register, b: Operand) {
+        // The operands may be in this register: it is written last.
+        let to = self.room(value);
+        self.list.apply(operation, to, a, b);
+        self.list.store(Place(Array::Work, usize::from(value)), to);
+    }
+
+    /// Stores a copy of a value as another one.
+    pub(super) fn copy(&mut self, from: u16, value: u16) {
+        let from = self.operand(from);
+        let to = self.room(value);
+        self.list.load(to, from);
+        self.list.store(Place(Array::Work, usize::from(value)), to);
     }
 
     /// Writes all operations of a step but the last, and returns that.

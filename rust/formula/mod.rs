@@ -8,10 +8,12 @@ mod kinks;
 mod parse;
 mod program;
 mod spline;
+mod step_code;
 
 pub use kinks::{Kink, Kinks};
 pub use program::{Place, Program};
 pub use spline::Spline;
+pub use step_code::{StageWeights, StepFrom};
 
 use thiserror::Error;
 

@@ -86,16 +86,18 @@ pub struct Program {
     /// The first registers hold so many components of the state.
     pub(super) states: usize,
     /// The next ones hold these.
-    leaves: Vec<Leaf>,
+    pub(super) leaves: Vec<Leaf>,
     /// How many of them the parameters determine: they are the last ones.
-    constants: usize,
+    pub(super) constants: usize,
     splines: Vec<Spline>,
     /// Operations on parameters and numbers alone. Their registers hold nothing else.
-    first: Vec<Step>,
+    pub(super) first: Vec<Step>,
     pub(super) steps: Vec<Step>,
-    results: Vec<u16>,
+    pub(super) results: Vec<u16>,
     registers: usize,
     pub(super) codes: Codes<Compiled>,
+    /// Those of whole steps of a Runge-Kutta method.
+    pub(super) step_codes: Codes<Compiled>,
 }
 
 /// The numbers of registers that programs have room for without an allocation: powers of two.
@@ -263,7 +265,7 @@ impl Program {
     }
 
     /// The number of registers that it runs with.
-    fn room(&self) -> usize {
+    pub(super) fn room(&self) -> usize {
         ROOMS.into_iter().find(|&room| self.registers <= room).unwrap_or(self.registers)
     }
 
@@ -699,6 +701,7 @@ impl<'a> Registers<'a> {
             steps,
             registers: self.count,
             codes: Codes::default(),
+            step_codes: Codes::default(),
         }
     }
 

@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 use super::dop853::Dop853Scheme;
 use super::method::{EIGHTHS, Method, QUARTERS, Trial};
 use super::tableau::{DormandPrince, Scheme};
+use crate::formula::StageWeights;
 use crate::model::{MOST_PROBES, Sides, StepStart, System};
 use crate::scalar::{Real, Scalar, vector};
 use crate::tolerance::ErrorNorm;
@@ -138,6 +139,8 @@ pub struct RungeKutta<T, S: Scalar, const D: usize, const N: usize, const P: usi
     stages: [[S; D]; N],
     /// The rate at the point reached.
     first: [S; D],
+    /// True if the last trial has computed the stages of the extension, too.
+    extended: bool,
     scheme: PhantomData<T>,
 }
 
@@ -150,7 +153,8 @@ pub type Dop853<S, const D: usize> = RungeKutta<Dop853Scheme, S, D, 16, 7>;
 impl<T, S: Scalar, const D: usize, const N: usize, const P: usize> Default for RungeKutta<T, S, D, N, P> {
     fn default() -> Self {
         let zero = [S::zero(); D];
-        Self { x: zero, h: S::Real::zero(), stages: [zero; N], first: zero, scheme: PhantomData }
+        let h = S::Real::zero();
+        Self { x: zero, h, stages: [zero; N], first: zero, extended: false, scheme: PhantomData }
     }
 }
 
@@ -159,6 +163,30 @@ where
     T: Scheme<N, P>,
     S: Scalar,
 {
+    /// The step by the law's own code for whole steps, with all stages.
+    #[inline(always)]
+    fn staged(
+        &mut self,
+        system: &impl System<S, D>,
+        at: &StepStart<S, D>,
+        h: S::Real,
+    ) -> Option<([S; D], [[S; D]; N])> {
+        if const { !S::IS_PLAIN || S::Real::LANES > 1 } {
+            return None;
+        }
+        let table = const { &T::TABLEAU };
+        let weights = StageWeights {
+            number: usize::from(table.order > 5),
+            stages: table.stages,
+            c: &table.c,
+            a: table.a.as_flattened(),
+        };
+        let mut stages = [self.first; N];
+        let x = system.staged(&weights, (at.t, &at.x, h), &at.sides, &mut stages);
+        self.extended = x.is_some();
+        Some((x?, stages))
+    }
+
     /// The coefficient of `h θ^(j+1)` in component `n`, of the numbers or of a part of them.
     #[inline(always)]
     fn power<A: Scalar>(&self, j: usize, n: usize, part: impl Fn(S) -> A) -> A {
@@ -208,7 +236,10 @@ where
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
-        let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
+        let (x, stages) = match self.staged(system, at, h) {
+            Some(step) => step,
+            None => step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides),
+        };
         let count = T::TABLEAU.stages;
         let error = combined(&const { &T::TABLEAU }.e, &stages, count, h);
         let mut error = norm.of_step(&error, &at.x, &x);
@@ -225,6 +256,9 @@ where
 
     #[inline(always)]
     fn extend(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>) {
+        if self.extended {
+            return;
+        }
         for i in T::TABLEAU.stages..N {
             let x = stage::<T, S, D, N, P>(i, &self.x, &self.stages, self.h);
             self.stages[i] = system.rates(S::lift(at.t + self.h.scale(T::TABLEAU.c[i])), &x, &at.sides);
@@ -275,5 +309,56 @@ where
             coefficients.push(components!(n => self.power(j, n, |s| s).times(self.h)));
         }
         self.h
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tableau::DormandPrince;
+    use super::*;
+    use crate::model::{Family, FormulaFamily, MAX_SURFACES};
+    use crate::scalar::Isa;
+
+    /// The new state and the stages of a step, by the law's code and without it.
+    fn steps<T: Scheme<N, P>, const N: usize, const P: usize>(texts: &[&str; 3]) -> [Vec<u64>; 2] {
+        let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        let family =
+            FormulaFamily::<3>::parse(&names(&["x", "y", "z"]), texts, &names(&["a", "b"]), &[]).unwrap();
+        let system = family.build(&[0.7, -1.3]);
+        let mut sides = [true; MAX_SURFACES];
+        sides[1] = false;
+        let at = StepStart { t: 0.5, x: [0.3, -2.1, 1.7], sides };
+        let mut method = RungeKutta::<T, f64, 3, N, P>::default();
+        method.begin(&system, &at, true);
+        let mut coded = None;
+        for _ in 0..2000 {
+            coded = method.staged(&system, &at, 0.1);
+        }
+        let (x, mut stages) = step::<T, f64, 3, N, P>(&system, at.t, &at.x, &method.first, 0.1, &at.sides);
+        for i in T::TABLEAU.stages..N {
+            let x = stage::<T, f64, 3, N, P>(i, &at.x, &stages, 0.1);
+            stages[i] = system.rates(at.t + 0.1 * T::TABLEAU.c[i], &x, &at.sides);
+        }
+        let has_code = cfg!(feature = "machine-code") && Isa::best() > Isa::Baseline;
+        assert_eq!((coded.is_some(), method.extended), (has_code, has_code));
+        let bits = |(x, stages): ([f64; 3], [[f64; 3]; N])| {
+            x.iter().chain(stages.as_flattened()).map(|value| value.to_bits()).collect()
+        };
+        [bits(coded.unwrap_or((x, stages))), bits((x, stages))]
+    }
+
+    #[test]
+    fn code_for_whole_steps_keeps_their_bits() {
+        for texts in [
+            ["y - x", "x*z", "a - x*y"],
+            ["y", "cos(1.1*t)*a - x^3 - b*sin(y)", "0"],
+            ["x*a - t", "abs(x)*y - max(y, z)", "sign(z)*t/(1 + x^2)"],
+            ["exp(-x^2)*b", "z", "where(x > y, x^a, sqrt(1 + y^2))"],
+        ] {
+            let [coded, plain] = steps::<DormandPrince, 7, 4>(&texts);
+            assert_eq!(coded, plain, "{texts:?}");
+            let [coded, plain] = steps::<Dop853Scheme, 16, 7>(&texts);
+            assert_eq!(coded, plain, "{texts:?}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! A system whose type is forgotten.
 
 use super::{EnclosedSurfaces, Piece, Probes, Sides, StepStart, System, TARGETS};
+use crate::formula::StageWeights;
 use crate::scalar::Scalar;
 
 /// Any [`System`]. Code that runs rarely is compiled for a `dyn AnySystem`: once for each kind of number instead of
@@ -8,6 +9,13 @@ use crate::scalar::Scalar;
 pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     /// See the methods of the same names of [`System`].
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];
+    fn staged(
+        &self,
+        weights: &StageWeights,
+        from: (S::Real, &[S; D], S::Real),
+        sides: &Sides<S>,
+        stages: &mut [[S; D]],
+    ) -> Option<[S; D]>;
     fn surfaces(&self) -> usize;
     fn surface(&self, j: usize, t: S, x: &[S; D], sides: &Sides<S>) -> S;
     fn is_steady(&self, j: usize, sides: &Sides<S>) -> bool;
@@ -34,6 +42,15 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
 impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         System::rates(self, t, x, sides)
+    }
+    fn staged(
+        &self,
+        weights: &StageWeights,
+        from: (S::Real, &[S; D], S::Real),
+        sides: &Sides<S>,
+        stages: &mut [[S; D]],
+    ) -> Option<[S; D]> {
+        System::staged(self, weights, from, sides, stages)
     }
     fn surfaces(&self) -> usize {
         System::surfaces(self)
@@ -91,6 +108,15 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
 impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         AnySystem::rates(&**self, t, x, sides)
+    }
+    fn staged(
+        &self,
+        weights: &StageWeights,
+        from: (S::Real, &[S; D], S::Real),
+        sides: &Sides<S>,
+        stages: &mut [[S; D]],
+    ) -> Option<[S; D]> {
+        AnySystem::staged(&**self, weights, from, sides, stages)
     }
     fn surfaces(&self) -> usize {
         AnySystem::surfaces(&**self)

@@ -1,6 +1,7 @@
 //! One of two models of the same dimension.
 
 use super::{EnclosedSurfaces, Family, Parameter, Piece, Probes, Sides, StepStart, System, TARGETS};
+use crate::formula::StageWeights;
 use crate::scalar::Scalar;
 
 /// A model of one kind or of another, distinguished at run time.
@@ -33,6 +34,16 @@ where
     #[inline(always)]
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         ask!(self, model => model.rates(t, x, sides))
+    }
+    #[inline(always)]
+    fn staged(
+        &self,
+        weights: &StageWeights,
+        from: (S::Real, &[S; D], S::Real),
+        sides: &Sides<S>,
+        stages: &mut [[S; D]],
+    ) -> Option<[S; D]> {
+        ask!(self, model => model.staged(weights, from, sides, stages))
     }
     #[inline(always)]
     fn surfaces(&self) -> usize {

@@ -9,7 +9,7 @@ use super::{
     EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Probes, Sides, Signals,
     StepStart, System, TARGETS, choose, enclosed, parameter, sides_of, suspect_in_turn,
 };
-use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Op, Place, Program};
+use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Op, Place, Program, StageWeights, StepFrom};
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
 
 /// A power of two, far from the states that linear functions are asked for.
@@ -179,6 +179,22 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
             sliding_mode::rates(&self.sliding, sides, &self.rates_on(t, x), &mut rates);
             rates
         }
+    }
+
+    fn staged(
+        &self,
+        weights: &StageWeights,
+        (t, x, h): (S::Real, &[S; D], S::Real),
+        sides: &Sides<S>,
+        stages: &mut [[S; D]],
+    ) -> Option<[S; D]> {
+        let slides = |own: &SlidingSurface<S>| sides[own.mode].any();
+        if !matches!(self.inputs, InputValues::None) || self.sliding.iter().any(slides) {
+            return None;
+        }
+        let from = StepFrom { t: S::lift(t), x, h: S::lift(h) };
+        let (mut new, stages) = ([S::zero(); D], stages.as_flattened_mut());
+        self.law.rates.run_step(weights, from, &self.fixed, sides, stages, &mut new).then_some(new)
     }
 
     #[inline]
@@ -364,7 +380,7 @@ impl<const D: usize> FormulaFamily<D> {
         &self.observation
     }
 
-    /// With what was measured of its inputs, record by record, and the number of that which counts by itself.
+    /// Takes over what was measured of its inputs, record by record, and the number of that which counts by itself.
     ///
     /// # Panics
     /// Where a record has another number of inputs than the model, or the model has more than [`MAX_INPUTS`].

@@ -33,6 +33,7 @@ pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick_slip::Sticking;
 pub use targets::{MOST_PROBES, Probes, StepStart, TARGETS, Targets, WALL, suspect, suspect_in_turn};
 
+use crate::formula::StageWeights;
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
 pub use crate::sides::{MAX_SURFACES, Sides, choose};
 
@@ -44,6 +45,19 @@ pub trait System<S: Scalar, const D: usize>: Sync {
     /// The right-hand side at time `t` and state `x`, each piecewise law continued smoothly from
     /// the given side of its surface.
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D];
+
+    /// Computes the rates at all stages of a Runge-Kutta step but the first, which is given, by code that the law has for
+    /// whole steps. Returns the new state, or nothing if there is no such code.
+    #[inline(always)]
+    fn staged(
+        &self,
+        _weights: &StageWeights,
+        _from: (S::Real, &[S; D], S::Real),
+        _sides: &Sides<S>,
+        _stages: &mut [[S; D]],
+    ) -> Option<[S; D]> {
+        None
+    }
 
     /// How many switching surfaces there are.
     fn surfaces(&self) -> usize {
@@ -138,6 +152,16 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
     #[inline(always)]
     fn rates(&self, t: S, x: &[S; D], sides: &Sides<S>) -> [S; D] {
         (**self).rates(t, x, sides)
+    }
+    #[inline(always)]
+    fn staged(
+        &self,
+        weights: &StageWeights,
+        from: (S::Real, &[S; D], S::Real),
+        sides: &Sides<S>,
+        stages: &mut [[S; D]],
+    ) -> Option<[S; D]> {
+        (**self).staged(weights, from, sides, stages)
     }
     #[inline(always)]
     fn surfaces(&self) -> usize {

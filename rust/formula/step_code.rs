@@ -1,0 +1,178 @@
+//! Machine code for whole Runge-Kutta steps of a law.
+//!
+//! The rates of a short law take less time than the call that evaluates them. Here the stages of a step and the sums between
+//! them are one function. It has the operations of the method's own step in the same order, so no bit changes.
+
+use super::Leaf;
+use super::compile::{Compiled, FIRST, INTERPRETED, SECOND, Writer};
+use super::program::Program;
+use crate::machine::{Listing, Operation};
+use crate::scalar::{Isa, Scalar};
+use crate::sides::Sides;
+
+/// The weights of a method's stages: stage `i` is the rate at `t + c_i h` and `x + h Σ_j a_ij k_j`.
+#[derive(Clone, Copy, Debug)]
+pub struct StageWeights {
+    /// Distinguishes the methods: 0 or 1.
+    pub number: usize,
+    /// How many stages make a step: the argument of the last of them is the new state.
+    pub stages: usize,
+    pub c: &'static [f64],
+    /// Row by row, as many columns as rows.
+    pub a: &'static [f64],
+}
+
+/// The start of a step and its size.
+#[derive(Clone, Copy, Debug)]
+pub struct StepFrom<'a, S> {
+    pub t: S,
+    pub x: &'a [S],
+    pub h: S,
+}
+
+/// The most operations: longer code is not in the cache when it is needed.
+const MOST_LINES: usize = 1 << 12;
+
+/// The numbers of the values of a step. The first ones are those of the program's registers.
+struct Values {
+    states: usize,
+    stages: usize,
+    x: usize,
+    new: usize,
+    t: usize,
+    h: usize,
+}
+
+impl Values {
+    fn of(registers: usize, states: usize, stages: usize) -> Self {
+        let x = registers + stages * states;
+        let new = x + states;
+        let t = new + states;
+        Self { states, stages: registers, x, new, t, h: t + 1 }
+    }
+
+    fn len(&self) -> usize {
+        self.h + 1
+    }
+
+    fn stage(&self, i: usize, n: usize) -> usize {
+        self.stages + i * self.states + n
+    }
+}
+
+fn number(i: usize) -> u16 {
+    u16::try_from(i).expect("fewer than 65536 values")
+}
+
+impl Program {
+    /// Computes the rates at all stages of a step but the first, which is given, and the new state. Returns false without
+    /// code for it. A program has as many results as there are states; `fixed` is as for [`run`](Program::run).
+    #[inline]
+    pub fn run_step<S: Scalar>(
+        &self,
+        weights: &StageWeights,
+        from: StepFrom<'_, S>,
+        fixed: &[S],
+        sides: &Sides<S>,
+        stages: &mut [S],
+        new: &mut [S],
+    ) -> bool {
+        let make = |lanes| if lanes == 1 { self.step_code(weights) } else { None };
+        let Some(code) = self.step_codes.get::<S>(weights.number, INTERPRETED, make) else { return false };
+        let values = Values::of(fixed.len(), new.len(), weights.c.len());
+        let mut run = |work: &mut [S]| {
+            if code.is_interrupted() {
+                work[..fixed.len()].copy_from_slice(fixed);
+            }
+            let (first, x) = (values.stages, values.x);
+            work[first..first + new.len()].copy_from_slice(&stages[..new.len()]);
+            work[x..x + new.len()].copy_from_slice(from.x);
+            (work[values.t], work[values.h]) = (from.t, from.h);
+            code.follow(self, fixed, sides, work);
+            stages.copy_from_slice(&work[first..x]);
+            new.copy_from_slice(&work[values.new..values.t]);
+        };
+        // Room without an allocation.
+        match values.len() {
+            0..=48 => run(&mut [S::zero(); 48]),
+            49..=96 => run(&mut [S::zero(); 96]),
+            97..=192 => run(&mut [S::zero(); 192]),
+            193..=384 => run(&mut [S::zero(); 384]),
+            more => run(&mut vec![S::zero(); more]),
+        }
+        true
+    }
+
+    fn step_code(&self, weights: &StageWeights) -> Option<Compiled> {
+        let leaves = &self.leaves[..self.leaves.len() - self.constants];
+        if leaves.iter().any(|leaf| *leaf != Leaf::Time) {
+            return None;
+        }
+        let (count, states) = (weights.c.len(), self.len());
+        let values = Values::of(self.room(), states, count);
+        let mut held = vec![false; self.room()];
+        held[self.states + leaves.len()..self.states + self.leaves.len()].fill(true);
+        for step in &self.first {
+            held[usize::from(step.to)] = true;
+        }
+        let mut writer = Writer::new(Listing::new(Isa::best(), 1), held);
+        for i in 1..count {
+            let weights_of_stage = &weights.a[i * count..i * count + i];
+            let is_last = i + 1 == weights.stages;
+            for n in 0..states {
+                if n < self.states {
+                    writer.argument(&values, weights_of_stage, n, n);
+                    if is_last {
+                        writer.copy(number(n), number(values.new + n));
+                    }
+                } else if is_last {
+                    writer.argument(&values, weights_of_stage, n, values.new + n);
+                }
+            }
+            for at in (self.states..).take(leaves.len()) {
+                writer.time(&values, weights.c[i], at);
+            }
+            writer.steps(&self.steps);
+            for (n, &result) in self.results.iter().enumerate() {
+                writer.copy(result, number(values.stage(i, n)));
+            }
+            if writer.list.len() > MOST_LINES {
+                return None;
+            }
+        }
+        writer.compiled()
+    }
+}
+
+impl Writer {
+    /// `x + h Σ_j a_j k_j` in component `n`, without the zero weights after the first.
+    fn argument(&mut self, values: &Values, weights: &[f64], n: usize, to: usize) {
+        for (j, &weight) in weights.iter().enumerate() {
+            if j > 0 && weight == 0.0 {
+                continue;
+            }
+            let term = if j == 0 { FIRST } else { SECOND };
+            let weight = self.list.constant(weight);
+            self.list.load(term, weight);
+            let stage = self.operand(number(values.stage(j, n)));
+            self.list.apply(Operation::Mul, term, term, stage);
+            if j > 0 {
+                self.list.apply(Operation::Add, FIRST, FIRST, SECOND);
+            }
+        }
+        let h = self.operand(number(values.h));
+        self.list.apply(Operation::Mul, FIRST, FIRST, h);
+        let x = self.operand(number(values.x + n));
+        self.write(number(to), Operation::Add, FIRST, x);
+    }
+
+    /// The time of a stage.
+    fn time(&mut self, values: &Values, part: f64, to: usize) {
+        let part = self.list.constant(part);
+        self.list.load(FIRST, part);
+        let h = self.operand(number(values.h));
+        self.list.apply(Operation::Mul, FIRST, FIRST, h);
+        let t = self.operand(number(values.t));
+        self.write(number(to), Operation::Add, FIRST, t);
+    }
+}
