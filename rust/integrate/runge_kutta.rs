@@ -352,7 +352,7 @@ mod tests {
         for texts in [
             ["y - x", "x*z", "a - x*y"],
             ["y", "cos(1.1*t)*a - x^3 - b*sin(y)", "0"],
-            ["x*a - t", "abs(x)*y - max(y, z)", "sign(z)*t/(1 + x^2)"],
+            ["x*a - t", "abs(x)*y - max(y, z)", "sign(x)*t/(1 + z^2)"],
             ["exp(-x^2)*b", "z", "where(x > y, x^a, sqrt(1 + y^2))"],
         ] {
             let [coded, plain] = steps::<DormandPrince, 7, 4>(&texts);
