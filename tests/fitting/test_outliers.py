@@ -1,4 +1,4 @@
-"""A few gross outliers, such as glitches of a tracker or codes for missing values, change no result."""
+"""Gross outliers, single or in blocks, such as glitches of a tracker or codes, change no result."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import udd
+from udd.fitting.outliers import odd_frames
 
 T = np.arange(0, 20, 0.05)
 SPRING = udd.Model(["x", "v"], ["v", "-k*x - c*v"], {"k": 4.0, "c": 0.1})
@@ -89,3 +90,101 @@ def test_a_fast_transient_is_no_outlier(rate: float) -> None:
     x = np.array(udd.simulate(decay, t, [100.0]).x) + 0.01 * np.random.default_rng(0).normal(size=len(t))
     result = udd.fit(udd.Measurement(t, {"x": x}), decay.with_parameters({"k": 0.8 * rate}))
     assert abs(result.parameters["k"] - rate) < 4 * result.errors["k"] < 0.1
+
+
+def block(frames: list[int], inside: str, size: float) -> udd.Measurement:
+    """Return the film of a swing whose tracker was wrong in these frames."""
+    theta = swing(0.0)["theta"].copy()
+    rng, t = np.random.default_rng(2), np.arange(len(frames))
+    theta[frames] = {
+        "reflection": theta[frames] + size,
+        "code": np.full(len(frames), size),
+        "lost": size * rng.choice([-1, 1], len(frames)) * rng.uniform(1, 2, len(frames)),
+        "another mark": size + 0.3 * size * np.sin(0.2 * t),
+    }[inside]
+    return udd.Measurement(T, {"theta": theta})
+
+
+@pytest.mark.parametrize(
+    ("frames", "inside", "size"),
+    [
+        ([120, 121], "reflection", 0.6),
+        ([300, 301, 302], "reflection", 30.0),
+        ([50, 51, 52, 53, 200, 204], "reflection", 1.0),
+        (list(range(200, 220)), "another mark", 2.0),
+        (list(range(60, 68)), "lost", 2.0),
+        (list(range(150, 210)), "code", 9999.0),
+        (list(range(20)), "code", -999.0),
+    ],
+)
+def test_blocks_of_outliers_of_a_film_do_not_hurt(frames: list[int], inside: str, size: float) -> None:
+    model = udd.Pendulum(1.0, k0=0.03)
+    clean, result = (udd.fit(measured, model) for measured in (swing(0.0), block(frames, inside, size)))
+    assert not result.doubts.missing
+    assert np.flatnonzero(result.noise.weight == 0.0).tolist() == frames
+    share = np.sqrt(len(T) / (len(T) - len(frames)))
+    assert abs(result.parameters["k0"] - clean.parameters["k0"]) < 1.2 * clean.errors["k0"]
+    assert 0.9 < result.errors["k0"] / clean.errors["k0"] < 1.3 * share
+
+
+def test_a_block_in_one_of_two_columns_with_gaps_and_uneven_stamps() -> None:
+    rng = np.random.default_rng(4)
+    t = np.delete(T + rng.uniform(-0.01, 0.01, len(T)), [100, 101, 251])
+    t -= t[0]
+    motion = udd.simulate(SPRING, t, [1.0, 0.0]).state
+    seen = motion + 0.01 * rng.normal(size=motion.shape)
+    wrong = seen.copy()
+    wrong[200:215, 1] = -8.0 + 0.01 * rng.normal(size=15)
+    clean, result = (udd.fit(udd.Measurement(t, {"x": s[:, 0], "v": s[:, 1]}), SPRING) for s in (seen, wrong))
+    record = result.record
+    assert not clean.record.odd.any()
+    assert record.row[record.odd].tolist() == list(range(200, 215))
+    for name, error in clean.errors.items():
+        assert abs(result.parameters[name] - clean.parameters[name]) < error
+
+
+def bouncing(t: np.ndarray) -> np.ndarray:
+    """Return the height of a ball that keeps 0.8 of its speed."""
+    x = np.empty(len(t))
+    start, speed = 0.0, 4.0
+    for k, now in enumerate(t):
+        while now > start + 2 * speed / 9.81:
+            start, speed = start + 2 * speed / 9.81, 0.8 * speed
+        x[k] = speed * (now - start) - 9.81 * (now - start) ** 2 / 2
+    return x
+
+
+KICKS = np.where(np.arange(0, 12, 0.02) < 5.0, 0.0, np.arange(0, 12, 0.02) - 5.0)
+EVENTS = {
+    "bounces": bouncing(np.arange(0, 3, 0.01)),
+    "a kick": np.sin(2 * np.arange(0, 12, 0.02)) + 3 * KICKS * np.exp(-KICKS),
+    "a step": 0.02 * np.sin(np.arange(0, 12, 0.02)) + np.where(KICKS > 0, 1.0, 0.0),
+    "a stop": np.where(KICKS > 0, np.cos(5.0), np.cos(np.arange(0, 12, 0.02))),
+}
+
+
+@pytest.mark.parametrize("noise", [1e-5, 1e-3])
+@pytest.mark.parametrize("name", EVENTS)
+def test_events_of_a_motion_are_no_outliers(name: str, noise: float) -> None:
+    x = EVENTS[name] + noise * np.random.default_rng(0).normal(size=len(EVENTS[name]))
+    t, linked = 0.02 * np.arange(len(x)), np.ones(len(x) - 1, dtype=bool)
+    assert not odd_frames(t, x[:, None], np.array([noise]), linked).any()
+
+
+@pytest.mark.parametrize("step", [0.1, 0.15])
+def test_spikes_of_a_motion_are_no_outliers(step: float) -> None:
+    relaxing = udd.Model(["x", "v"], ["v", "mu*(1 - x^2)*v - x"], {"mu": 10.0})
+    t = np.arange(0, 100, step)
+    x = udd.simulate(relaxing, t, [1.0, 1.0]).state[:, 0]
+    noise = 0.01 * np.random.default_rng(0).normal(size=len(t))
+    result = udd.fit(udd.Measurement(t, {"x": x + noise}), relaxing.replace(mu=9.0))
+    assert abs(result.parameters["mu"] - 10.0) < 4 * result.errors["mu"] < 0.01
+
+
+def test_uneven_stamps_are_no_outliers() -> None:
+    rng = np.random.default_rng(5)
+    t = np.sort(T + rng.uniform(-0.04, 0.04, len(T)))
+    linked = np.ones(len(t) - 1, dtype=bool)
+    for phase in np.linspace(0, 3, 20):
+        x = 0.5 * np.sin(3 * t + phase) + 1e-3 * rng.normal(size=len(t))
+        assert not odd_frames(t, x[:, None], np.array([1e-3]), linked).any()

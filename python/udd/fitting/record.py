@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
-from scipy.ndimage import maximum_filter1d
 
 from udd._util.one_line import OneLine
 from udd.errors import FitError
@@ -21,6 +19,7 @@ from udd.models.formula_model import FormulaModel
 
 from .continuous import angles_of
 from .formula_models import checked_start, driven, guessed, slope, typical_noise
+from .outliers import akima, between, odd_frames
 from .sensor import (
     NO_NOISE,
     few_readings,
@@ -34,15 +33,10 @@ from .sensor import (
 
 Array = NDArray[np.float64]
 
-#: A frame is an outlier if its distance exceeds this times the typical one; normal noise does in 1 of 1e8.
-_ODD = 9.0
 _FEWEST = 10  # Frames of a fit.
 _FEWEST_OF_SEVERAL = 4  # The same of each of several records. Start states use up fewer.
 _SHORT = 30  # A record with fewer frames hardly shows its noise.
-_END, _JUMP = 8, 30.0  # Frames at an end of a run; no motion jumps there by so many of their steps.
-_LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
 _OF_FRAMES = ("t", "seen", "sigma", "rho", "states", "odd", "row", "film")  # arrays with a row for each frame
-_CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,7 +59,7 @@ class Record(OneLine):
     states : ndarray (n, d)
         A first guess of the states.
     odd : ndarray of bool (n,)
-        True for outliers, which are far from the curve through their neighbours. A fit starts without them.
+        True for outliers, see :func:`.outliers.odd_frames`. A fit starts without them.
     row : ndarray of int (n,)
         Row of the frame in the measurement. It is -1 if the frame was inserted.
     film : ndarray of int (n,)
@@ -264,9 +258,9 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
         rho[np.ix_(there, places, places)] = np.where(observed_pairs, correlation, np.eye(len(columns)))
     guess = np.column_stack([_joined_up(t, t[there], column) for column in read.T])
     typical = np.array([np.median(column[np.isfinite(column)]) for column in sigma[:, places].T])
-    odd = odd_frames(guess, typical, linked)
+    odd = odd_frames(t, guess, typical, linked)
     for channel in guess.T:
-        channel[odd] = _between(odd, channel)
+        channel[odd] = between(odd, channel)
     if odd[there].any() and stated is None:  # outliers do not show the noise, nor the range, of a column
         clean = np.where(present & odd[there, None], guess[there], read)
         sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, clean), np.inf)
@@ -286,13 +280,7 @@ def _joined_up(t: Array, there: Array, column: Array) -> Array:
     if present.all():
         result: Array = np.interp(t, there, column)
         return result
-    return _akima(t, there[present], column[present])
-
-
-def _akima(at: Array, there: Array, column: Array) -> Array:
-    """Interpolate by Akima's method, which follows a motion's curvature; constant beyond the ends."""
-    result: Array = Akima1DInterpolator(there, column)(np.clip(at, there[0], there[-1]))
-    return result
+    return akima(t, there[present], column[present])
 
 
 def _noise_of(measurement: Measurement, values: Array) -> Array:
@@ -342,57 +330,3 @@ def _fill(
     times = np.where(last, t[before + 1], number * (gap / steps)[before] + t[before])
     origin = np.where(last, rows[before + 1], -1)
     return np.append(t[:1], times), np.append(rows[:1], origin), gap[before] <= longest
-
-
-def odd_frames(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Detect frames far from the cubic through the two before and after, in any channel (noise `sigma`)."""
-    n = len(guess)
-    odd = _odd_ends(guess, sigma, linked)
-    inside = np.zeros(n, dtype=bool)
-    inside[2:-2] = linked[:-3] & linked[1:-2] & linked[2:-1] & linked[3:]
-    if not inside.any():
-        return odd
-    filled = guess.copy()
-    for channel in filled.T:
-        channel[odd] = _between(odd, channel)
-    for _ in range(_CLEANED):
-        off = np.zeros_like(guess)
-        cubic = (4 * (filled[1:-3] + filled[3:-1]) - filled[:-4] - filled[4:]) / 6
-        off[2:-2] = np.abs(filled[2:-2] - cubic)
-        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
-        # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
-        # steps.
-        step = np.abs(np.diff(filled, axis=0))
-        off[2:-2][off[2:-2] < _LEAP * np.maximum(step[:-3], step[3:])] = 0.0
-        off[~inside | odd] = 0.0
-        # Only the worst of adjacent outliers is removed in a round: it distorts the cubics of the others.
-        far = (off / typical).max(axis=1)
-        is_odd = (far > _ODD) & (far >= maximum_filter1d(far, 5))
-        if not is_odd.any():
-            break
-        odd |= is_odd
-        for channel in filled.T:
-            channel[odd] = _between(odd, channel)
-    return odd
-
-
-def _odd_ends(guess: Array, sigma: Array, linked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Detect a first or second frame of a run, or a last, that lies far beyond the steps of the next frames.
-
-    A fast transient is no outlier: each of its steps is a share of the step before.
-    """
-    odd = np.zeros(len(guess), dtype=bool)
-    for run in np.split(np.arange(len(guess)), np.flatnonzero(~linked) + 1):
-        for frames in (run, run[::-1]) if len(run) >= 2 * _END else ():
-            x = guess[frames[:_END]]
-            steps = np.maximum(np.abs(np.diff(x, axis=0)), sigma)
-            across = np.maximum(np.abs(x[2] - x[0]), steps[2:].max(axis=0))
-            odd[frames[0]] |= (steps[0] > _JUMP * steps[1:].max(axis=0)).any()
-            odd[frames[1]] |= (np.minimum(steps[0], steps[1]) > _JUMP * across).any()
-    return odd
-
-
-def _between(odd: NDArray[np.bool_], x: Array) -> Array:
-    """Interpolate the outliers from the other frames."""
-    number = np.arange(len(x), dtype=np.float64)
-    return _akima(number[odd], number[~odd], x[~odd])

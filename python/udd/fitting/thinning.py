@@ -13,7 +13,7 @@ from udd.measurement import Measurement
 from udd.measurement.unwrapping import unwrapped
 from udd.models import profile_of
 
-from .record import odd_frames
+from .outliers import odd_frames
 from .sensor import is_encoder, lattice, noise_by_differences
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ def _averaged(
     length = every * step
     part = np.floor((t - t[0]) / length * _PARTS + 1e-9).astype(np.int64)
     block = part // _PARTS
-    good = ~odd_frames(values, noise_by_differences(values, _ORDER), np.diff(t) < _NEXT * step)
+    good = ~odd_frames(t, values, noise_by_differences(values, _ORDER), np.diff(t) < _NEXT * step)
     number = int(block[-1]) + 1
     count = np.bincount(block[good], minlength=number)
     kept = count >= _KEPT * every

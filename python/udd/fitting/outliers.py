@@ -1,0 +1,305 @@
+"""Outliers of a record: frames, or short blocks of frames, that no smooth motion passes through."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
+from scipy.ndimage import maximum_filter1d
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: A frame is an outlier if its distance exceeds this times the typical one; normal noise does in 1 of 1e8.
+_ODD = 9.0
+_END, _JUMP = 8, 30.0  # Frames at an end of a run; no motion jumps there by so many of their steps.
+_LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
+# Distance from the lines through either side below which a motion has a kink: a share of that from the cubic.
+_KINK = 0.2
+_CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
+_LONGEST = 20  # frames of a block
+_NOISE = 3.0  # Standard deviations by which the mean speed between two frames may be wrong.
+_AROUND, _LEAST = 5, 4  # Steps on each side of a block that show the motion's speed, and the fewest.
+#: A jump exceeds the range of the speeds around it by this times the range; a bridge by no more than this.
+_BEYOND, _BRIDGE = 2.0, 1.0
+_RARE, _FEW = 0.005, 3  # Share of the frames, or number, above which blocks are spikes of the motion.
+_CODE = 3.0  # Distance of a code from the other values, in ranges of these.
+_REPEATS, _VALUES = 3, 10  # The fewest frames with a code, and the fewest other values.
+
+
+def odd_frames(t: Array, guess: Array, sigma: Array, linked: Flags) -> Flags:
+    """Detect codes for missing values, blocks of outliers, and frames far from the cubic through others.
+
+    Parameters
+    ----------
+    t : ndarray (n,)
+    guess : ndarray (n, m)
+        The channels.
+    sigma : ndarray (m,)
+        Their noise.
+    linked : ndarray of bool (n - 1,)
+        True if a frame continues the motion of the one before.
+
+    Returns
+    -------
+    ndarray of bool (n,)
+        True for frames in which any channel is an outlier.
+    """
+    codes = np.any([_codes(channel) for channel in guess.T], axis=0)
+    odd = _odd_blocks(t, guess, sigma, linked, codes)
+    odd |= _odd_ends(guess, sigma, linked)
+    return _odd_singles(t, guess, sigma, linked, odd)
+
+
+def between(odd: Flags, x: Array) -> Array:
+    """Interpolate the outliers of a channel from the other frames."""
+    number = np.arange(len(x), dtype=np.float64)
+    return akima(number[odd], number[~odd], x[~odd])
+
+
+def akima(at: Array, there: Array, column: Array) -> Array:
+    """Interpolate by Akima's method, which follows a motion's curvature; constant beyond the ends."""
+    result: Array = Akima1DInterpolator(there, column)(np.clip(at, there[0], there[-1]))
+    return result
+
+
+def _codes(x: Array) -> Flags:
+    """Detect a code for missing values: a repeated extreme value far beyond the range of all others."""
+    odd = np.zeros(len(x), dtype=bool)
+    values, counts = np.unique(x, return_counts=True)
+    while len(values) > _VALUES:
+        for end, rest in ((0, values[1:]), (-1, values[:-1])):
+            gap = abs(values[end] - rest[end])
+            if counts[end] >= _REPEATS and gap > _CODE * np.ptp(rest):
+                odd |= x == values[end]
+                values, counts = rest, counts[1:] if end == 0 else counts[:-1]
+                break
+        else:
+            break
+    return odd
+
+
+class _Steps(NamedTuple):
+    """Steps between frames that are no outliers so far.
+
+    Attributes
+    ----------
+    t : ndarray (n,)
+    x : ndarray (n, m)
+    run : ndarray of int (n,)
+        Number of each frame's run of linked frames.
+    speed : ndarray (n - 1, m)
+        Mean speed from each frame to the next.
+    dt : ndarray (n - 1, 1)
+    sigma : ndarray (m,)
+        Noise of the channels.
+    """
+
+    t: Array
+    x: Array
+    run: NDArray[np.int64]
+    speed: Array
+    dt: Array
+    sigma: Array
+
+    def ranges(self, width: int) -> tuple[Array, Array]:
+        """Return the least and largest speed in so many steps before and after each frame, (n, m, 2) each.
+
+        They are NaN where fewer than a few of these steps exist, because a run begins or ends.
+        """
+        inside = (np.diff(self.run) == 0)[:, None]
+        pad, window = ((width, width), (0, 0)), (width, 0)
+        low, high = (
+            np.pad(np.where(inside, self.speed, fill), pad, constant_values=fill)
+            for fill in (np.inf, -np.inf)
+        )
+        low, high = (
+            sliding_window_view(low, *window).min(axis=-1),
+            sliding_window_view(high, *window).max(axis=-1),
+        )
+        count = sliding_window_view(np.pad(inside, pad), *window).sum(axis=-1)
+        result = np.where(count[..., None] < _LEAST, np.nan, np.stack([low, high], axis=-1))
+        n = len(self.t)
+        return result[:n], result[width : width + n]
+
+    def jumps(self, numbers: NDArray[np.int64], ranges: Array) -> Flags:
+        """Return True for each of these steps and each channel if its speed is far outside a range."""
+        low, high = ranges[..., 0], ranges[..., 1]
+        excess = np.maximum(self.speed[numbers] - high, low - self.speed[numbers])
+        is_fast: Flags = excess > _BEYOND * (high - low)
+        return is_fast & (excess * self.dt[numbers] > _ODD * self.noise)
+
+    def bridges(
+        self, first: NDArray[np.int64], last: NDArray[np.int64], ranges: Array, share: float
+    ) -> Flags:
+        """Return True for each pair of frames and each channel if the motion can pass through both.
+
+        The mean speed between them exceeds the range by at most this share of it, and by the noise.
+        """
+        low, high = ranges[..., 0], ranges[..., 1]
+        time = (self.t[last] - self.t[first])[:, None]
+        speed = (self.x[last] - self.x[first]) / time
+        excess = np.maximum(speed - high, low - speed)
+        result: Flags = excess <= share * (high - low) + _NOISE * self.noise / time
+        return result
+
+    @property
+    def noise(self) -> Array:
+        """Noise of a difference between frames, (m,)."""
+        result: Array = np.sqrt(2.0) * self.sigma
+        return result
+
+
+class _Block(NamedTuple):
+    """Frames from `start` to before `end`, and which of them are outliers."""
+
+    start: int
+    end: int
+    odd: Flags
+
+
+def _odd_blocks(t: Array, x: Array, sigma: Array, linked: Flags, odd: Flags) -> Flags:
+    """Detect blocks of outliers: the motion jumps, jumps back, and continues as if there were no block.
+
+    A jump is a step whose speed lies far outside the range of the speeds before and after the block. A kick
+    or an impact bends the motion, but its speed stays within that range. Both ends of a block are jumps, so
+    a good frame next to an outlier does not belong to it.
+    """
+    run = np.concatenate([[0], np.cumsum(~linked)])
+    codes, number = odd, 0
+    for _ in range(_CLEANED):
+        kept = np.flatnonzero(~odd)
+        blocks = _blocks(t[kept], x[kept], sigma, run[kept])
+        if not blocks:
+            break
+        odd = odd.copy()
+        for start, end, is_odd in blocks:
+            odd[kept[start:end][is_odd]] = True
+            number += bool((is_odd[1:] & is_odd[:-1]).any())
+    # Jumps that recur are spikes of the motion.
+    return odd if number <= max(_RARE * len(t), _FEW) else codes
+
+
+def _blocks(t: Array, x: Array, sigma: Array, run: NDArray[np.int64]) -> list[_Block]:
+    """List blocks that do not overlap, the shortest first."""
+    if len(t) < 2 * _LEAST + 3:
+        return []
+    dt = np.diff(t)
+    dt = np.maximum(dt, 0.5 * float(np.median(dt)))[:, None]
+    steps = _Steps(t, x, run, np.diff(x, axis=0) / dt, dt, sigma)
+    before, _after = steps.ranges(_AROUND)
+    starts = np.flatnonzero(steps.jumps(np.arange(len(dt)), before[:-1]).any(axis=1)) + 1
+    taken = np.zeros(len(t), dtype=bool)
+    result: list[_Block] = []
+    for length in range(1, _LONGEST + 1) if len(starts) else ():
+        for block in _blocks_of(steps, starts[starts < len(t) - length], length):
+            if not taken[block.start - 1 : block.end + 1].any():
+                taken[block.start : block.end] = True
+                result.append(block)
+    return result
+
+
+def _blocks_of(steps: _Steps, starts: NDArray[np.int64], length: int) -> Iterator[_Block]:
+    """Find blocks of so many frames that begin at one of the `starts`, that with the clearest jumps first."""
+    first, last = starts - 1, starts + length
+    before, after = (
+        side[at] for side, at in zip(steps.ranges(max(length, _AROUND)), (first, last), strict=True)
+    )
+    ranges = np.stack(
+        [np.minimum(before[..., 0], after[..., 0]), np.maximum(before[..., 1], after[..., 1])], axis=-1
+    )
+    is_odd = (
+        steps.jumps(first, ranges)
+        & steps.jumps(last - 1, ranges)
+        & steps.bridges(first, last, ranges, _BRIDGE)
+    )
+    is_odd[steps.run[first] != steps.run[last]] = False
+    for k in np.flatnonzero(is_odd.any(axis=1)):
+        # Good frames between two outliers stay.
+        inner = np.arange(starts[k], last[k])
+        before_inner, after_inner = np.full(length, first[k]), np.full(length, last[k])
+        is_reached = steps.bridges(before_inner, inner, ranges[[k]], 0.0)
+        is_reached &= steps.bridges(inner, after_inner, ranges[[k]], 0.0)
+        odd: Flags = ~np.all(is_reached[:, is_odd[k]], axis=1)
+        if odd.any():
+            yield _Block(int(starts[k]), int(last[k]), odd)
+
+
+def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags) -> Flags:
+    """Detect frames far from the cubic through the two before and after, in any channel."""
+    n, odd = len(guess), odd.copy()
+    inside = np.zeros(n, dtype=bool)
+    inside[2:-2] = linked[:-3] & linked[1:-2] & linked[2:-1] & linked[3:]
+    # The frames inside a block do not show where the frames next to it should be.
+    block = np.zeros(n, dtype=bool)
+    block[1:-1] = odd[1:-1] & (odd[:-2] | odd[2:])
+    inside &= ~maximum_filter1d(block, 5)
+    if not inside.any():
+        return odd
+    filled = guess.copy()
+    for channel in filled.T:
+        channel[odd] = between(odd, channel)
+    weights, noisier = _cubic(t)
+    dt = np.diff(t)[:, None]
+    longest = np.maximum(dt[1:-2], dt[2:-1])
+    for _ in range(_CLEANED):
+        off = np.zeros_like(guess)
+        around = (filled[:-4], filled[1:-3], filled[3:-1], filled[4:])
+        cubic = sum(w[:, None] * x for w, x in zip(weights, around, strict=True))
+        off[2:-2] = np.abs(filled[2:-2] - cubic) / noisier[:, None]
+        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
+        # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
+        # steps.
+        speed = np.abs(np.diff(filled, axis=0)) / dt
+        off[2:-2][off[2:-2] < _LEAP * longest * np.maximum(speed[:-3], speed[3:])] = 0.0
+        # A kick or an impact, which a cubic does not follow, lies between the lines through its sides.
+        sides = np.stack([2 * filled[1:-3] - filled[:-4], 2 * filled[3:-1] - filled[4:]])
+        beyond = np.maximum(filled[2:-2] - sides.max(axis=0), sides.min(axis=0) - filled[2:-2])
+        off[2:-2][beyond < _KINK * off[2:-2]] = 0.0
+        off[~inside | odd] = 0.0
+        # Only the worst of adjacent outliers is removed in a round: it distorts the cubics of the others.
+        far = (off / typical).max(axis=1)
+        is_odd = (far > _ODD) & (far >= maximum_filter1d(far, 5))
+        if not is_odd.any():
+            break
+        odd |= is_odd
+        for channel in filled.T:
+            channel[odd] = between(odd, channel)
+    return odd
+
+
+def _cubic(t: Array) -> tuple[list[Array], Array]:
+    """Return the weights of the cubic through the two frames before and after each frame, and its noise.
+
+    The noise of the distance from the cubic is relative to that of even stamps, and at least 1.
+    """
+    at, around = t[2:-2], (t[:-4], t[1:-3], t[3:-1], t[4:])
+    weights = []
+    for place in around:
+        weight = np.ones(len(at))
+        for other in around:
+            if other is not place:
+                weight *= (at - other) / (place - other)
+        weights.append(weight)
+    even = np.sqrt(35.0 / 18.0)
+    return weights, np.maximum(np.sqrt(1.0 + sum(w**2 for w in weights)) / even, 1.0)
+
+
+def _odd_ends(guess: Array, sigma: Array, linked: Flags) -> Flags:
+    """Detect a first or second frame of a run, or a last, that lies far beyond the steps of the next frames.
+
+    A fast transient is no outlier: each of its steps is a share of the step before.
+    """
+    odd = np.zeros(len(guess), dtype=bool)
+    for run in np.split(np.arange(len(guess)), np.flatnonzero(~linked) + 1):
+        for frames in (run, run[::-1]) if len(run) >= 2 * _END else ():
+            x = guess[frames[:_END]]
+            steps = np.maximum(np.abs(np.diff(x, axis=0)), sigma)
+            across = np.maximum(np.abs(x[2] - x[0]), steps[2:].max(axis=0))
+            odd[frames[0]] |= (steps[0] > _JUMP * steps[1:].max(axis=0)).any()
+            odd[frames[1]] |= (np.minimum(steps[0], steps[1]) > _JUMP * across).any()
+    return odd
