@@ -223,8 +223,12 @@ def final(**values: tuple[float, float]) -> Any:
     """A fit of which only the numbers count."""
     order = {name.replace("__", "."): value for name, (value, _sd) in values.items()}
     covariance = np.diag([sd**2 for _value, sd in values.values()])
-    record = SimpleNamespace(film=np.zeros(500, int), t=np.linspace(0.0, 10.0, 500))
-    return SimpleNamespace(parameters=order, covariance=covariance, model=udd.Disk(0.04), record=record)
+    t = np.linspace(0.0, 10.0, 500)
+    record = SimpleNamespace(film=np.zeros(500, int), t=t)
+    states = np.column_stack([np.sin(t), 0.01 * np.sin(t), 0.04 + 0.01 * np.cos(t), t])
+    return SimpleNamespace(
+        parameters=order, covariance=covariance, model=udd.Disk(0.04), record=record, states=states
+    )
 
 
 def test_a_law_with_memory_is_compared_at_its_most_probable_model_error():
@@ -245,6 +249,37 @@ def test_a_constant_within_three_standard_errors_is_not_determined():
     effect = udd.effects.quadratic_drag(c=0.01)
     assert undetermined(added(effect), final(quadratic_drag__c=(0.01, 0.004))) == ["c"]
     assert undetermined(added(effect), final(quadratic_drag__c=(0.01, 0.002))) == []
+
+
+def own(text: str, **values: float) -> udd.effects.Effect:
+    return udd.effects.formula("friction", text, amplitudes=["a"], name="own", **values)
+
+
+@pytest.mark.parametrize(
+    ("text", "sd", "open_constants"),
+    [
+        ("a*exp(-((Y - c)/0.002)^2)", 1e-4, []),
+        ("a*exp(-((Y - c)/0.002)^2)", 0.02, ["c"]),  # Y moves by 0.02
+        ("a*exp(cos(beta + c))", 0.2, []),
+        ("a*exp(cos(beta + c))", 2.0, ["c"]),
+        ("a*sin(3*t + c)", 0.2, []),
+        ("a*tanh((Omega - c)/0.1)", 0.01, ["c"]),  # a speed has a natural zero
+        ("a*max(abs(Omega) - c, 0)", 0.01, ["c"]),
+        ("a*(c + exp(Y))", 0.01, ["c"]),
+        ("a*tanh(c*Y)", 0.01, ["c"]),
+    ],
+)
+def test_places_and_phases_have_no_natural_zero(text, sd, open_constants):
+    effect = own(text, a=0.01, c=0.001)
+    numbers = final(own__a=(0.01, 0.001), own__c=(0.001, sd))
+    assert undetermined(added(effect, errors={"a": 0.001, "c": sd}), numbers) == open_constants
+
+
+def test_the_place_of_a_brake_of_the_library_has_no_natural_zero():
+    brake = udd.effects.local_brake(a=0.01, c=0.01, s=0.2)
+    errors = {"a": (0.01, 0.001), "c": (0.01, 0.02), "s": (0.2, 0.02)}
+    numbers = final(**{f"local_brake__{name}": value for name, value in errors.items()})
+    assert undetermined(added(brake, errors={k: sd for k, (_v, sd) in errors.items()}), numbers) == []
 
 
 def test_the_amplitudes_of_a_wave_count_together():

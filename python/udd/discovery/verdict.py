@@ -13,6 +13,7 @@ from udd.discovery.validation.held_out_errors import Ratio
 from udd.fitting import Fit
 from udd.fitting.diagnostics import readings
 
+from .natural_zero import shift_ranges
 from .results import AddedEffect
 
 _SIZE = 0.98  # ratio of held-out errors below which a gain has a size
@@ -105,19 +106,25 @@ def _predicts(cost: Ratio, held_out: int) -> bool:
 
 
 def undetermined(added: AddedEffect, final: Fit) -> list[str]:
-    """Return constants of an effect that are within three standard errors of zero.
+    """Return constants of an effect that the data do not determine.
 
-    Amplitudes that belong together, such as those of a sine and a cosine, count as one.
+    A constant with a natural zero must be more than three standard errors from it. Amplitudes that belong
+    together, such as those of a sine and a cosine, count as one. A place or a phase has no natural zero:
+    three standard errors must be less than half of the range of what it is compared with.
     """
     order = list(final.parameters)
     result = []
     amplitudes = [p for p in added.effect.amplitudes if f"{added.effect.name}.{p}" in order]
     groups = [amplitudes, *([p] for p in added.errors if p not in amplitudes)]
+    ranges = shift_ranges(added.effect, final)
     for group in filter(None, groups):
         rows = [order.index(f"{added.effect.name}.{p}") for p in group]
         values = np.array([added.parameters[p] for p in group])
         block = final.covariance[np.ix_(rows, rows)]
-        if np.linalg.matrix_rank(block) < len(rows) or (
+        if group[0] in ranges:
+            if not _DETERMINED * np.sqrt(block[0, 0]) < ranges[group[0]] / 2:
+                result += group
+        elif np.linalg.matrix_rank(block) < len(rows) or (
             values @ np.linalg.solve(block, values) < _DETERMINED**2
         ):
             result += group
