@@ -70,11 +70,22 @@ def test_a_slow_spiral_is_no_escape() -> None:
     assert udd.lyapunov_spectrum(model, state0=[1.0, 2.0]).verdict != "escapes"
 
 
+# The distance from rest falls with the root of the logarithm of the time, or with the logarithm.
+@pytest.mark.parametrize(
+    ("rate", "start"),
+    [("-x*exp(-1/x^2)", 1.0), ("-(x - 5)*exp(-1/(x - 5)^2)", 6.0), ("-x*exp(-1/abs(x))", -0.5)],
+)
+@pytest.mark.filterwarnings("ignore::udd.errors.ConvergenceWarning")
+def test_the_slowest_decay_is_no_escape(rate: str, start: float) -> None:
+    assert udd.lyapunov_spectrum(udd.Model(["x"], [rate]), state0=[start]).verdict != "escapes"
+
+
 # The same laws with other signs, and speeds that fall with the time.
 @pytest.mark.parametrize(
     ("rates", "start"),
     [
         (["1/(1 + x^2)"], [0.0]),
+        (["1e-3"], [1e6]),
         (["x^3"], [1e-3]),
         (["-x^2"], [-1.0]),
         (["x*v", "-v + x^2"], [0.1, 0.1]),

@@ -33,7 +33,8 @@ _RETURNS = 20.0  # Mean times between section points that show the size of a mot
 _SAMPLES = 2000
 _NOISE = 100.0  # Times the tolerance: a component that moves less is at rest.
 _GROWS = 1.3  # Growth of an unbounded motion each time that the time doubles.
-_DOUBLINGS = 8
+_DOUBLINGS, _SLOWEST = 8, 100  # The same of a motion that has hardly begun.
+_BEGUN = 0.5  # Share of its state by which a motion must move to show how it grows.
 _FAR = 1e12  # Times its first size: a motion that grew so far is unbounded.
 
 
@@ -194,7 +195,11 @@ class Orbit:
         plain = [k for k, name in enumerate(self.model.state_names) if name not in self.model.angles]
         span = _RETURNS * (self._coordinates.clock if clock is None else clock)
         first = last = None
-        for _ in range(_DOUBLINGS):
+        size = np.zeros(len(plain))
+        for number in range(_SLOWEST):
+            # A drift that has moved the state little is nearly linear in time, whether or not it ends.
+            if number >= _DOUBLINGS and (size > _BEGUN * np.abs(state[plain])).any():
+                break
             run = self._sampled(state, span)
             if run is None:
                 return True
