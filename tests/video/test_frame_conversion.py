@@ -77,6 +77,16 @@ def test_a_conversion_is_recognised_and_undone(how: str, sources: int, frames: i
     assert np.sqrt(np.mean(off**2, axis=(1, 2))).max() < 6
 
 
+@pytest.mark.parametrize(
+    "kind", [Conversion(4, 5, HOW[0], 2), Conversion(24, 25, HOW[0], 0), Conversion(4, 5, HOW[2], 1)]
+)
+def test_the_noise_of_separated_frames_is_that_of_their_shares(kind: Conversion) -> None:
+    shown = 128 + 8 * np.random.default_rng(3).normal(size=(78, 40, 48))
+    again = np.array([p.y.astype(float).var() for p in kind.undo(exact(shown, 30.0))])
+    noise = kind.noise(len(shown))
+    assert noise.max() > 1.4 and again / 8**2 == pytest.approx(noise, rel=0.15)
+
+
 def test_frames_of_a_camera_have_no_conversion() -> None:
     for seed in range(4):
         assert recognised(pictures(textures(240, seed), 30.0)) is None
@@ -103,6 +113,8 @@ def test_a_film_of_mixed_frames_is_measured_at_the_rate_of_the_camera(tmp_path: 
     off = 1e3 * (m.values - run.state[:, 1:])
     off[:, 2] -= 2000 * np.pi * np.round(np.nanmedian(off[:, 2]) / (2000 * np.pi))
     assert rms(off)[0] < 0.06 and rms(off)[1] < 0.06 and rms(off)[2] < 0.8
+    spread = np.sqrt(np.linalg.det(m.covariance()[:, :2, :2]))  # variance of the place
+    assert np.nanmedian(spread[2::4]) / np.nanmedian(spread[::4]) == pytest.approx(1.75, rel=0.3)
     shown = udd.tracking.pictures_at(film.path, [3], m)[0]
     pure = next(p for p in Film(film.path).pictures() if p.index == 5)  # of the film, frame 4 of the camera
     assert shown.shape[:2] == pure.y.shape

@@ -107,7 +107,8 @@ def to_metres(
         centre_sigma = disk.rim.centre_sigma
     if moved is not None and not moved.steady:
         disk = replace(disk, shared=[*disk.shared, *moved.errors(tracks.centre)])
-    own_errors = to_mid_exposure(tracks, covariance(tracks, disk.state.look), disk.state.exposure**2 / 12)
+    own_errors = covariance(tracks, disk.state.look) * _separation_noise(film, len(tracks))[:, None, None]
+    own_errors = to_mid_exposure(tracks, own_errors, disk.state.exposure**2 / 12)
     alike = common_mode_errors(tracks, add_shared_errors(own_errors, 0.0, disk.shared), camera)
     shared = [*disk.shared, *(alike[:, None] * np.eye(3)[axis] for axis in (0, 1))]  # u and v: two causes
     values, sigma, rho = metres(tracks, add_shared_errors(own_errors, centre_sigma, shared), camera)
@@ -136,6 +137,18 @@ def to_metres(
     except ValueError as error:
         raise TrackError(f"{film.path}: {error}{_commonest(flags)}") from None
     return Tracking(m, tracks, disk.state, camera, disk.rim)
+
+
+def _separation_noise(film: Film, count: int) -> Array:
+    """Return the variance of each frame's errors against those of a coded frame (count,).
+
+    The errors of coded frames are independent, so those of separated frames add up. Codecs move all marks
+    alike where a disk hardly moves. The marks' agreement does not show this part.
+    """
+    if film.conversion is None:
+        return np.ones(count)
+    noise = np.maximum(film.conversion.noise(film.packets), 1.0)[:count]
+    return np.pad(noise, (0, count - len(noise)), constant_values=1.0)
 
 
 def _commonest(flags: Sequence[str]) -> str:

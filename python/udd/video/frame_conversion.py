@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from .reader import Picture, Plane
 
 Array = NDArray[np.float64]
+Frame = TypeVar("Frame")
 #: Frames of the camera per frames of the film: 24 in 30, 25 in 30, 30 in 60, 24 in 60, 25 in 60, ...
 RATIOS = ((4, 5), (5, 6), (1, 2), (2, 5), (5, 12), (3, 5), (2, 3), (1, 3), (12, 25))
 #: The same in a long cycle. A pendulum with the period of the cycle shows its frames' relation, too, but when
@@ -74,28 +76,40 @@ class Conversion:
 
     def undo(self, pictures: Iterable[Picture]) -> Iterator[Picture]:
         """Yield the camera's frames; those at the ends that are not determined are left out."""
-        first = (-self.phase) % self.frames  # row of the cycle to which the film's first frame belongs
-        block: list[Picture] = []
         number = 0
-        for picture in pictures:
-            block.append(picture)
-            if first + len(block) == self.frames + 1:
-                for out in self._separated(block, first, False):
-                    yield replace(out, index=number)
-                    number += 1
-                block, first = [picture], 0
-        if block:
-            for out in self._separated(block, first, True):
+        for block, first, last in self._blocks(pictures):
+            for out in self._separated(block, first, last):
                 yield replace(out, index=number)
                 number += 1
 
+    def noise(self, frames: int) -> Array:
+        """Return the variance of each of the camera's frames, from a film of so many frames of variance 1."""
+        parts = self._blocks(range(frames))
+        shares = [each for block, first, last in parts for _, each in self._shares(len(block), first, last)]
+        return np.array([float(np.square(each).sum()) for each in shares])
+
+    def _blocks(self, frames: Iterable[Frame]) -> Iterator[tuple[list[Frame], int, bool]]:
+        """Yield the frames of each cycle with the next one, the row of the first, and True for the last."""
+        first = (-self.phase) % self.frames  # row of the cycle to which the film's first frame belongs
+        block: list[Frame] = []
+        for frame in frames:
+            block.append(frame)
+            if first + len(block) == self.frames + 1:
+                yield block, first, False
+                block, first = [frame], 0
+        if block:
+            yield block, first, True
+
+    def _shares(self, count: int, first: int, last: bool) -> Iterator[tuple[int, tuple[float, ...]]]:
+        """Yield the camera's frames that a block determines, and the share of each frame of the block."""
+        for source, shares in _inverse(tuple(map(tuple, self.weights[first : first + count]))):
+            if source < self.sources or last:  # otherwise it is the first of the next cycle
+                yield source, shares
+
     def _separated(self, block: list[Picture], first: int, last: bool) -> Iterator[Picture]:
         """Yield the camera's frames that a block of the film determines: rows of a cycle from `first` on."""
-        rows = tuple(map(tuple, self.weights[first : first + len(block)]))
         times = np.array([picture.t for picture in block])
-        for source, shares in _inverse(rows):
-            if source == self.sources and not last:
-                continue  # it is the first of the next cycle
+        for source, shares in self._shares(len(block), first, last):
             used = [(p, s) for p, s in zip(block, shares, strict=True) if abs(s) > NEGLIGIBLE]
             at = source * self.frames / self.sources - first
             yield Picture(
