@@ -12,7 +12,8 @@ import pytest
 import discovered
 import udd
 from simulated import film
-from udd.discovery.experiment_design import SEPARATED, _films, _ranked
+from udd.discovery.experiment_design import _films, _ranked
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.fitting import at_level, fit_record, record_of
 from udd.report import as_text, summary_of
 
@@ -47,7 +48,7 @@ def test_a_second_drive_is_proposed_for_slip_or_relaxation():
     assert any("slip" in other.title for other in result.alternatives)
     assert result.hint is not None and "times the drive" in result.hint.design
     assert any("slip" in title for title in result.hint.parts)
-    assert result.hint.nats >= SEPARATED
+    assert result.hint.nats >= EVIDENCE_MARGIN
     # Neither another start nor a longer film at the one drive would tell.
     telling = [hint for hint in result.hints if any("slip c Z" in title for title in hint.parts)]
     assert all("times the drive" in hint.design for hint in telling)
@@ -100,7 +101,7 @@ def test_a_weak_doubt_that_no_film_settles_is_said_so():
         alternatives=[replace(slip, effect=slip.effect.replace(c=0.02 * DRIVE))],
     )
     (hint,) = faint.hints
-    assert hint.design == "" and hint.nats < SEPARATED
+    assert hint.design == "" and hint.nats < EVIDENCE_MARGIN
     assert hint.text.startswith("no feasible film would separate them")
 
 

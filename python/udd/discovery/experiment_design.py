@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from udd import _core
 from udd._util.odds import odds
 from udd._util.parallel import parallel_map
+from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import renamed
 from udd.effects import Effect
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Expected difference in log likelihood (nats) from which on forms are distinguished, as in the search.
-SEPARATED = 10.0
 _STARTS = 6  # places of the record from which a further film may start, tried in turn
 _SHORTEST = 0.5  # share of the film's length: if the disk loses contact sooner, the film is not feasible
 
@@ -60,7 +59,7 @@ class NextExperiment:
     @property
     def parts(self) -> list[str]:
         """Titles of the alternatives that the film would distinguish from the chosen form."""
-        return [title for title, nats in self.each.items() if nats >= SEPARATED]
+        return [title for title, nats in self.each.items() if nats >= EVIDENCE_MARGIN]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the advice as JSON-ready values."""
@@ -142,10 +141,10 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
     """Describe the designs: those that distinguish most forms first."""
     result = []
     for design, each in designs:
-        parts = [nats for nats in each.values() if nats >= SEPARATED]
+        parts = [nats for nats in each.values() if nats >= EVIDENCE_MARGIN]
         if parts:
-            excluded = ", ".join(f"{t} (odds of {odds(n)})" for t, n in each.items() if n >= SEPARATED)
-            left = ", ".join(t for t, n in each.items() if n < SEPARATED)
+            excluded = ", ".join(f"{t} (odds of {odds(n)})" for t, n in each.items() if n >= EVIDENCE_MARGIN)
+            left = ", ".join(t for t, n in each.items() if n < EVIDENCE_MARGIN)
             text = f"film {design}: it is expected to separate what was found from {excluded}"
             text += f"; not from {left}" if left else ""
             result.append(NextExperiment(design, min(parts), each, text))
@@ -159,7 +158,7 @@ def _ranked(designs: Sequence[tuple[str, dict[str, float]]]) -> list[NextExperim
     most = max(each.values())
     text = (
         f"no feasible film would separate them: the best, {design}, is expected to give odds of "
-        f"{odds(most)}, and {odds(SEPARATED)} are needed"
+        f"{odds(most)}, and {odds(EVIDENCE_MARGIN)} are needed"
     )
     return [NextExperiment("", most, each, text)]
 

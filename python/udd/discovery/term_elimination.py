@@ -22,8 +22,8 @@ from udd.fitting.record import Record
 from udd.measurement import Measurement
 from udd.models import Model
 
-#: Probability of keeping a superfluous term, over all terms together.
-ALPHA = 1e-3
+from .thresholds import ALPHA
+
 _FAR = -6.0  # change of the criterion below which terms are removed several at a time
 _EQUAL = 1e-3  # in the criterion
 _LOOSE = 1  # schedule level of a fit that a wrong model does not distort

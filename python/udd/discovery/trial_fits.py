@@ -13,10 +13,8 @@ from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import physical
 from udd.discovery.symbolic.formulas import Formula
-from udd.effects.user_defined import along_of
 from udd.errors import FitError
 from udd.fitting import Fit, Goal, extend, started_at
-from udd.models.formula_model import FormulaModel
 
 from .curve_effects import fit_curve, fit_formula
 from .thresholds import ALPHA
@@ -146,28 +144,7 @@ def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | N
     if not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)
-    cost = located.cost + _excess(current, located.curve)
-    return TrialFit([candidate], located.fit, [], cost, located.curve.df, located.curve)
-
-
-def _excess(current: Fit, curve: Curve) -> float:
-    """Return the cost, in nats, of a curve's values beyond the largest observed rates.
-
-    Its prior has their width. A curve wider by a factor pays the factor's logarithm for each estimated
-    number.
-    """
-    if not isinstance(current.model, FormulaModel):
-        return 0.0  # the disk's own tests limit its curves
-    model, linked = current.model, current.record.linked
-    rates = np.diff(current.states, axis=0)[linked] / np.diff(current.record.t)[linked, None]
-    shown = rates[:, model.state_names.index(curve.slot.equation)]
-    if along_of(curve.slot.name):
-        speeds = list(model.speeds.values())
-        forces = model.mass_matrix(current.states[:-1][linked])[:, speeds.index(curve.slot.equation)]
-        shown = (forces * rates[:, [model.state_names.index(name) for name in speeds]]).sum(axis=1)
-    most = float(np.abs(curve.values(*curve.places)).max())
-    ratio = most / max(float(np.abs(shown).max()), 1e-300)
-    return curve.df * math.log(max(ratio, 1.0))
+    return TrialFit([candidate], located.fit, [], located.cost, located.curve.df, located.curve)
 
 
 def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None = None) -> TrialFit | None:
