@@ -231,16 +231,12 @@ class _Pruning:
         """Remove terms, reduce the model error, exchange; from a small and from a large model error.
 
         The two remove terms in a different order, which decides between sets of terms that are almost
-        equivalent.
+        equivalent, as in ODEBench 24.
         """
         ends = []
         for level in dict.fromkeys((self.full.level, min(self.full.level, _LOOSE))):
-            current, last = at_level(self.full, level), -1
             # With fewer terms a smaller model error may be possible.
-            while current.level > last:
-                last = current.level
-                current = self._tightened(self._without(current, gently=True))
-            ends.append(self._tightened(self._without(current)))
+            ends.append(self._tightened(self._without(at_level(self.full, level))))
         level = min(end.level for end in ends)
         current = min(ends, key=lambda end: self.criterion(at_level(end, level)))
         for _ in range(_ROUNDS):
@@ -277,16 +273,13 @@ class _Pruning:
         schedule = fitted.problem.schedule[fitted.level :]
         return solve(fitted.problem, schedule, fitted.point)
 
-    def _without(self, current: Fit, gently: bool = False, kept: str | None = None) -> Fit:
-        """Remove terms as long as that decreases the criterion, several at a time while it does by far.
-
-        With `gently` only terms that hardly matter are removed. `kept` is a term to keep.
-        """
+    def _without(self, current: Fit, kept: str | None = None) -> Fit:
+        """Remove terms but `kept` as long as that decreases the criterion, several at a time if by far."""
         needed = set() if kept is None else {kept}
         while True:
             order = [(n, change) for n, change in self._order(current) if n not in needed]
             some = [name for name, change in order if change < _FAR][: max(len(order) // 2, 1)]
-            if not some and not gently:
+            if not some:
                 some = [name for name, change in order[:1] if change < 0.0]
             if not some:
                 return current
@@ -352,6 +345,7 @@ class _Pruning:
 
     def _exchanged(self, current: Fit) -> Fit | None:
         """Return a better set of terms, with one restored and others removed; else None."""
+        # ODEBench 41 (1 % noise, `spread` = 1): otherwise a wrong set remains.
         fixed = [
             f for f in self.full.problem.free if f.name in self.names and f.name not in current.parameters
         ]

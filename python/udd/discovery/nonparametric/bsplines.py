@@ -71,11 +71,6 @@ class Spline:
         result: Array = second.T @ second
         return result
 
-    def values(self, coefficients: Array, x: Array) -> Array:
-        """Evaluate the curve with these coefficients at places."""
-        result: Array = self.design(x) @ coefficients
-        return result
-
     def full(self, coefficients: Array) -> Array:
         """Return the coefficients for a spline without a period, `intervals + 3` of them."""
         return np.concatenate([coefficients, coefficients[:3]]) if self.periodic else coefficients

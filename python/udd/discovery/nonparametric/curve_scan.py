@@ -162,11 +162,6 @@ class CurveScan:
     curves: list[Curve]
     comparisons: int
 
-    @property
-    def p(self) -> float:
-        """Probability that any of them fits so well by chance."""
-        return min(min((c.p for c in self.curves), default=1.0) * self.comparisons, 1.0)
-
 
 def scan_curves(
     fit: Fit,
