@@ -1,10 +1,10 @@
-//! Registers for listings of packets: values stay in registers as long as these suffice.
+//! Registers for listings: values stay in registers as long as these suffice.
 //!
 //! A listing loads each operand where it needs it, and stores each result. Most of the loads are those of values that were in a
 //! register shortly before. All uses are known in advance, so the value whose next use is the furthest gives way
 //! (L. A. Belady, IBM Systems Journal 5 (1966) 78). The operations and their order do not change.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::listing::{Array, Line, Operand, Operation, Place, Register};
 
@@ -17,6 +17,8 @@ struct Known {
     home: Option<Place>,
     /// True if it is there already.
     saved: bool,
+    /// How many numbers it has.
+    width: usize,
     /// The operations that need it, the last one first.
     uses: Vec<usize>,
     register: Option<usize>,
@@ -26,12 +28,34 @@ struct Known {
 enum Action {
     /// The operation, its result, the sum that it adds to, and its two operands.
     Apply(Operation, Value, Option<Value>, Option<Value>, Value),
-    Store(Place, Value),
+    Store(usize, Place, Value),
+    StoreUpper(Place, Value),
+    /// A result: a number and another one from memory, the two halves of it, or the upper half of it.
+    LoadUpper(Value, Value, Place),
+    Join(Value, Value, Value),
+    Part(Value, Value),
 }
 
-/// The same operations with as many registers; `None` if a place has several values. Elements of the work from
-/// `results` on are not needed afterwards.
-pub(super) fn allocate(lines: &[Line], registers: usize, results: usize) -> Option<Vec<Line>> {
+impl Action {
+    fn needs(self) -> [Option<Value>; 3] {
+        match self {
+            Action::Apply(_, _, sum, a, b) => [sum, a, Some(b)],
+            Action::Join(_, a, b) => [Some(a), Some(b), None],
+            Action::Store(.., a)
+            | Action::StoreUpper(_, a)
+            | Action::LoadUpper(_, a, _)
+            | Action::Part(_, a) => [Some(a), None, None],
+        }
+    }
+}
+
+/// The same operations, each with the numbers that it takes at once, with as many registers; `None` if a place has
+/// several values. Elements of the work from `results` on are not needed afterwards.
+pub(super) fn allocate(
+    lines: &[(usize, Line)],
+    registers: usize,
+    results: usize,
+) -> Option<Vec<(usize, Line)>> {
     let (known, actions) = values(lines, results)?;
     let mut room = Room { known, held: vec![None; registers], lines: Vec::with_capacity(lines.len()) };
     for action in actions {
@@ -41,21 +65,32 @@ pub(super) fn allocate(lines: &[Line], registers: usize, results: usize) -> Opti
 }
 
 /// The values of a list of operations and what is done with them.
-fn values(lines: &[Line], results: usize) -> Option<(Vec<Known>, Vec<Action>)> {
+fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Action>)> {
     let (mut known, mut actions) = (Vec::<Known>::new(), Vec::with_capacity(lines.len()));
-    let (mut in_place, mut in_register) = (HashMap::<Place, Value>::new(), HashMap::<u8, Value>::new());
-    for &line in lines {
+    let mut in_place = HashMap::<(Place, usize), Value>::new();
+    let mut in_register = [None; 1 << u8::BITS];
+    // These are read from memory in any case.
+    let upper = |&(_, line): &(usize, Line)| match line {
+        Line::LoadUpper(_, _, place) => Some(place),
+        _ => None,
+    };
+    let read: HashSet<Place> = lines.iter().filter_map(upper).collect();
+    for &(width, line) in lines {
         let mut of = |operand, known: &mut Vec<Known>| match operand {
-            Operand::Register(register) => in_register.get(&register.0).copied(),
-            Operand::Place(place) => Some(*in_place.entry(place).or_insert_with(|| {
-                known.push(Known { home: Some(place), saved: true, ..Known::default() });
+            Operand::Register(register) => in_register[usize::from(register.0)],
+            Operand::Place(place) => Some(*in_place.entry((place, width)).or_insert_with(|| {
+                known.push(Known { home: Some(place), saved: true, width, ..Known::default() });
                 known.len() - 1
             })),
+        };
+        let new = |width, known: &mut Vec<Known>| {
+            known.push(Known { width, ..Known::default() });
+            known.len() - 1
         };
         match line {
             Line::Load(to, from) => {
                 let value = of(from, &mut known)?;
-                in_register.insert(to.0, value);
+                in_register[usize::from(to.0)] = Some(value);
             }
             Line::Apply(operation, to, a, b) => {
                 let b = of(b, &mut known)?;
@@ -64,32 +99,55 @@ fn values(lines: &[Line], results: usize) -> Option<(Vec<Known>, Vec<Action>)> {
                     Operation::Fused => Some(of(to.into(), &mut known)?),
                     _ => None,
                 };
-                known.push(Known::default());
-                let result = known.len() - 1;
+                let result = new(width, &mut known);
                 actions.push(Action::Apply(operation, result, sum, a, b));
-                in_register.insert(to.0, result);
+                in_register[usize::from(to.0)] = Some(result);
             }
             Line::Store(place, from) => {
                 let value = of(from.into(), &mut known)?;
-                if in_place.insert(place, value).is_some() {
+                // The lowest of several numbers is read from memory.
+                let is_part = known[value].width != width;
+                let stored = if is_part { new(width, &mut known) } else { value };
+                known[stored].home.get_or_insert(place);
+                known[stored].saved |= is_part;
+                if in_place.insert((place, width), stored).is_some() {
                     return None;
                 }
-                known[value].home.get_or_insert(place);
-                if place.1 < results {
-                    actions.push(Action::Store(place, value));
+                if is_part || place.1 < results || read.contains(&place) {
+                    actions.push(Action::Store(width, place, value));
                 }
             }
-            _ => return None,
+            Line::StoreUpper(place, from) => {
+                actions.push(Action::StoreUpper(place, of(from.into(), &mut known)?));
+                known.push(Known { home: Some(place), saved: true, width: 1, ..Known::default() });
+                if in_place.insert((place, 1), known.len() - 1).is_some() {
+                    return None;
+                }
+            }
+            Line::LoadUpper(to, a, place) => {
+                let a = of(a.into(), &mut known)?;
+                let result = new(2, &mut known);
+                actions.push(Action::LoadUpper(result, a, place));
+                in_register[usize::from(to.0)] = Some(result);
+            }
+            Line::Join(to, a, b) => {
+                let (a, b) = (of(a.into(), &mut known)?, of(b.into(), &mut known)?);
+                let result = new(4, &mut known);
+                actions.push(Action::Join(result, a, b));
+                in_register[usize::from(to.0)] = Some(result);
+            }
+            Line::Part(to, a) => {
+                let a = of(a.into(), &mut known)?;
+                let result = new(2, &mut known);
+                actions.push(Action::Part(result, a));
+                in_register[usize::from(to.0)] = Some(result);
+            }
+            Line::End => return None,
         }
     }
     for (i, &action) in actions.iter().enumerate().rev() {
-        match action {
-            Action::Store(_, value) => known[value].uses.push(i),
-            Action::Apply(_, _, sum, a, b) => {
-                for value in [sum, a, Some(b)].into_iter().flatten() {
-                    known[value].uses.push(i);
-                }
-            }
+        for value in action.needs().into_iter().flatten() {
+            known[value].uses.push(i);
         }
     }
     Some((known, actions))
@@ -99,23 +157,45 @@ fn values(lines: &[Line], results: usize) -> Option<(Vec<Known>, Vec<Action>)> {
 struct Room {
     known: Vec<Known>,
     held: Vec<Option<Value>>,
-    lines: Vec<Line>,
+    lines: Vec<(usize, Line)>,
 }
 
 impl Room {
     fn perform(&mut self, action: Action) {
         match action {
-            Action::Store(place, value) => {
+            Action::Store(width, place, value) => {
                 let own = &self.known[value];
                 if !(own.saved && own.home == Some(place)) {
                     let from = self.loaded(value, &[value]);
-                    self.lines.push(Line::Store(place, name(from)));
-                    self.known[value].saved |= self.known[value].home == Some(place);
+                    self.lines.push((width, Line::Store(place, name(from))));
+                    let own = &mut self.known[value];
+                    own.saved |= own.home == Some(place);
                 }
                 self.used(value);
             }
+            Action::StoreUpper(place, value) => {
+                let from = self.loaded(value, &[value]);
+                self.lines.push((2, Line::StoreUpper(place, name(from))));
+                self.used(value);
+            }
+            Action::LoadUpper(result, a, place) => {
+                self.join(result, &[a], |to, from| Line::LoadUpper(to, from[0], place));
+            }
+            Action::Join(result, a, b) => {
+                self.join(result, &[a, b], |to, from| Line::Join(to, from[0], from[1]));
+            }
+            Action::Part(result, a) => self.join(result, &[a], |to, from| Line::Part(to, from[0])),
             Action::Apply(operation, result, sum, a, b) => self.apply(operation, result, sum, (a, b)),
         }
+    }
+
+    /// Makes a value of others, which are in registers.
+    fn join(&mut self, result: Value, needed: &[Value], line: impl FnOnce(Register, &[Register]) -> Line) {
+        let from: Vec<_> = needed.iter().map(|&value| name(self.loaded(value, needed))).collect();
+        needed.iter().for_each(|&value| self.used(value));
+        let to = self.free(needed);
+        self.lines.push((self.known[result].width, line(name(to), &from)));
+        self.put(result, to);
     }
 
     fn apply(
@@ -125,7 +205,7 @@ impl Room {
         sum: Option<Value>,
         (mut a, mut b): (Option<Value>, Value),
     ) {
-        use Operation::{Add, And, Fused, Mul, Or, Xor};
+        use Operation::{Add, And, AndNot, Fused, Mul, Or, Xor};
         if let Some(first) = a
             && matches!(operation, Add | Mul | Fused | And | Or | Xor)
             && self.known[first].register.is_none()
@@ -137,7 +217,10 @@ impl Room {
         needed.extend(sum.into_iter().chain(a));
         let sum_in = sum.map(|sum| self.loaded(sum, &needed));
         let a_in = a.map(|a| self.loaded(a, &needed));
-        let b_in = if self.is_left_in_memory(b, &needed) {
+        let width = self.known[result].width;
+        // These operations read the bits of two numbers.
+        let is_bits = matches!(operation, And | AndNot | Or | Xor);
+        let b_in = if !(width == 1 && is_bits) && self.is_left_in_memory(b, &needed) {
             Operand::Place(self.known[b].home.expect("a place"))
         } else {
             name(self.loaded(b, &needed)).into()
@@ -145,12 +228,12 @@ impl Room {
         // A sum that is needed again is copied, while its factors are where they are.
         let copied = sum.filter(|&sum| self.known[sum].uses.len() > uses_of(sum, &needed)).map(|_| {
             let to = self.free(&needed);
-            self.lines.push(Line::Load(name(to), name(sum_in.expect("a sum")).into()));
+            self.lines.push((width, Line::Load(name(to), name(sum_in.expect("a sum")).into())));
             to
         });
         needed.iter().for_each(|&value| self.used(value));
         let to = copied.or(sum_in).unwrap_or_else(|| self.free(&needed));
-        self.lines.push(Line::Apply(operation, name(to), name(a_in.unwrap_or(to)), b_in));
+        self.lines.push((width, Line::Apply(operation, name(to), name(a_in.unwrap_or(to)), b_in)));
         self.put(result, to);
         if self.known[result].uses.is_empty() {
             self.drop(result);
@@ -160,7 +243,8 @@ impl Room {
     /// Returns true if an operand is taken from memory because no register is worth it.
     fn is_left_in_memory(&self, value: Value, needed: &[Value]) -> bool {
         let own = &self.known[value];
-        if own.register.is_some() || !own.saved || own.home.is_none_or(|place| place.0 == Array::Constants) {
+        let is_shared = |place: Place| place.0 == Array::Constants && own.width > 1;
+        if own.register.is_some() || !own.saved || own.home.is_none_or(is_shared) {
             return false;
         }
         // This use is the last but those before it.
@@ -195,7 +279,7 @@ impl Room {
         let register = own.register.expect("a register");
         if !own.saved {
             own.saved = true;
-            self.lines.push(Line::Store(own.home.expect("a place"), name(register)));
+            self.lines.push((own.width, Line::Store(own.home.expect("a place"), name(register))));
         }
         self.drop(value);
         register
@@ -208,7 +292,7 @@ impl Room {
         }
         let register = self.free(needed);
         let home = self.known[value].home.expect("a value that was given up has a place");
-        self.lines.push(Line::Load(name(register), home.into()));
+        self.lines.push((self.known[value].width, Line::Load(name(register), home.into())));
         self.put(value, register);
         register
     }
@@ -247,10 +331,10 @@ mod tests {
     use super::*;
 
     /// A machine that does what a listing says; the work begins behind ten elements of each other array.
-    fn run(lines: &[Line], registers: usize, work: usize) -> Vec<f64> {
+    fn run(lines: &[(usize, Line)], registers: usize, work: usize) -> Vec<f64> {
         let mut memory: Vec<f64> = (0..work).map(|i| (i as f64 * 0.7).sin() + 0.1).collect();
         let mut held = vec![f64::NAN; registers];
-        for &line in lines {
+        for &(_, line) in lines {
             let of = |operand, memory: &[f64], held: &[f64]| match operand {
                 Operand::Register(Register(i)) => held[usize::from(i)],
                 Operand::Place(Place(Array::Work, at)) => memory[at],
@@ -278,7 +362,7 @@ mod tests {
     }
 
     /// A list of operations by four registers: each stores its result, and loads earlier results.
-    fn listed(seed: u64, length: usize) -> Vec<Line> {
+    fn listed(seed: u64, length: usize) -> Vec<(usize, Line)> {
         let mut state = seed;
         let mut below = |n: usize| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -301,7 +385,7 @@ mod tests {
             lines.push(Line::Apply(Operation::Mul, name(to), name(to), Place(Array::Constants, 0).into()));
             lines.push(Line::Store(Place(Array::Work, i), name(to)));
         }
-        lines
+        lines.into_iter().map(|line| (8, line)).collect()
     }
 
     /// As many values as there are pass through eight registers, and none is lost.
@@ -314,7 +398,9 @@ mod tests {
             let [before, after] = [&lines, &allocated].map(|lines| run(lines, 8, length));
             let bits = |all: &[f64]| all[..results].iter().map(|x| x.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(&before), bits(&after), "seed {seed}");
-            let loads = |lines: &[Line]| lines.iter().filter(|line| matches!(line, Line::Load(..))).count();
+            let loads = |lines: &[(usize, Line)]| {
+                lines.iter().filter(|(_, line)| matches!(line, Line::Load(..))).count()
+            };
             assert!(loads(&allocated) < loads(&lines));
         }
     }
@@ -323,7 +409,7 @@ mod tests {
     #[test]
     fn places_have_one_value() {
         let (place, register) = (Place(Array::Work, 3), name(0));
-        let lines = [Line::Load(register, place.into()), Line::Store(place, register)];
+        let lines = [Line::Load(register, place.into()), Line::Store(place, register)].map(|line| (8, line));
         assert!(allocate(&lines, 16, 9).is_none());
     }
 }

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use super::allocate::allocate;
 use crate::scalar::Isa;
 
-/// A register, by its number below 16; AVX-512 has 32.
+/// A register, by its number below 16; AVX-512 has 32. Lists whose registers are [allocated](Listing::allocate) name any
+/// number of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register(pub u8);
 
@@ -149,6 +150,11 @@ impl Listing {
         self.push(Line::Apply(operation, to, a, b));
     }
 
+    /// Returns true if an element of an array is one number.
+    pub fn is_single(&self) -> bool {
+        self.lanes == 1
+    }
+
     /// How many elements the next operations take.
     pub fn width(&self) -> usize {
         self.width
@@ -174,15 +180,22 @@ impl Listing {
         self.set_width(places.len());
     }
 
-    /// Stores two or four numbers in different places.
+    /// Stores two or four numbers. Several numbers for one place are equal.
     pub fn scatter(&mut self, places: &[Place], from: Register, other: Register) {
-        for (from, pair) in [from, other].into_iter().zip(places.chunks(2)) {
-            self.set_width(1);
-            self.store(pair[0], from);
-            self.checked(pair[1].into());
-            self.push(Line::StoreUpper(pair[1], from));
-            if from != other && places.len() > 2 {
+        for (i, &place) in places.iter().enumerate() {
+            if i == 2 {
                 self.push(Line::Part(other, from));
+            }
+            if places[..i].contains(&place) {
+                continue;
+            }
+            let half = if i < 2 { from } else { other };
+            self.set_width(1);
+            if i.is_multiple_of(2) {
+                self.store(place, half);
+            } else {
+                self.checked(place.into());
+                self.push(Line::StoreUpper(place, half));
             }
         }
         self.set_width(places.len());
@@ -193,18 +206,19 @@ impl Listing {
         self.push(Line::End);
     }
 
-    /// Lets operations of packets find their operands in registers. Elements of the work from `results` on are not needed
-    /// after a function.
-    pub fn allocate(&mut self, results: usize) {
-        assert!(self.lanes > 1, "operations of one width");
-        let registers = if self.isa == Isa::Avx512 { 32 } else { 16 };
+    /// Lets operations find their operands in registers. Elements of the work from `results` on are not needed after a
+    /// function. Returns false if a place has several values.
+    #[must_use]
+    pub fn allocate(&mut self, results: usize) -> bool {
+        let registers = if self.isa == Isa::Avx512 && self.lanes > 1 { 32 } else { 16 };
         let mut lines = Vec::with_capacity(self.lines.len());
         for function in self.lines.split_inclusive(|line| line.1 == Line::End) {
-            let body: Vec<_> = function.iter().map(|line| line.1).filter(|line| *line != Line::End).collect();
-            let body = allocate(&body, registers, results).unwrap_or(body);
-            lines.extend(body.into_iter().chain([Line::End]).map(|line| (self.width, line)));
+            let (body, end) = function.split_at(function.len() - 1);
+            let Some(body) = allocate(body, registers, results) else { return false };
+            lines.extend(body.iter().chain(end));
         }
         self.lines = lines;
+        true
     }
 
     fn push(&mut self, line: Line) {

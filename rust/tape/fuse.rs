@@ -84,6 +84,8 @@ pub(super) struct Program {
     /// Slots of rates that are needed elsewhere, too, and the components they belong to.
     pub(super) copied: Vec<(u16, u16)>,
     pub(super) slots: usize,
+    /// The slots that are filled, besides the state's.
+    pub(super) filled: Vec<u16>,
     pub(super) plan: Plan,
     pub(super) codes: Codes<Code>,
     starts: Codes<Start>,
@@ -223,7 +225,12 @@ impl Program {
         stretches.push(fusing.stretch);
         let copied = (0..).zip(rates).filter(|&(n, _)| !delivered[usize::from(n)]);
         let copied = copied.map(|(n, &slot)| (slot, n)).collect();
-        let program = Self { stretches, copied, slots, ..Self::default() };
+        let mut filled = Vec::new();
+        for Stretch { chains, last } in &stretches {
+            filled.extend(chains.iter().filter(|chain| !chain.is_rate).map(|chain| chain.to));
+            filled.extend(last.iter().flat_map(|step| (step.to..).take(step.node.slots())));
+        }
+        let program = Self { stretches, copied, slots, filled, ..Self::default() };
         machine::shared(&LATEST, Self { plan: Plan::of(&program), ..program })
     }
 

@@ -35,8 +35,9 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     pub fn new(tape: &Tape<D>, isa: Isa) -> Self {
         const { assert!(N >= 5 && N <= INVERSE.len(), "between 4 and 24 orders") };
         let zero = S::Real::zero();
-        // Single trajectories have the rows of machine code behind the slots.
-        let rows = if Self::IS_SINGLE { tape.program.plan.numbers(N).div_ceil(N) } else { 0 };
+        // Machine code has rows and sums behind the slots.
+        let rows =
+            if S::IS_PLAIN { compile::numbers(&tape.program, N, Self::IS_SINGLE).div_ceil(N) } else { 0 };
         Self {
             isa,
             order: N - 1,
@@ -108,7 +109,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
 
     /// Takes order 0 from the values, if they are of this place.
     #[inline(always)]
-    fn is_begun(&mut self, t: S::Real, x: &[S; D], sides: &Sides<S>) -> bool {
+    fn is_begun(&mut self, filled: &[u16], t: S::Real, x: &[S; D], sides: &Sides<S>) -> bool {
         let Some(at) = &self.values_at else { return false };
         let same = |a: S::Real, b: S::Real| a.lane(0).to_bits() == b.lane(0).to_bits();
         let mut all = same(at.t, t);
@@ -117,10 +118,10 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             all &= at.sides[j].lane(0) == sides[j].lane(0);
         }
         if all {
-            for (work, values) in self.work.iter_mut().zip(&self.values) {
-                work[0] = S::lift(values[0]);
+            for &slot in filled {
+                self.work[usize::from(slot)][0] = S::lift(self.values[usize::from(slot)][0]);
             }
-            unroll!(n in 0..D => { self.work[n][1] = S::lift(self.values[n][1]); });
+            unroll!(n in 0..D => { self.work[n][..2].copy_from_slice(&self.values[n].map(S::lift)); });
         }
         all
     }
@@ -146,7 +147,7 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     /// As [`expand`](Jets::expand) after [`hold`](Jets::hold), with the caller's instructions.
     #[inline(always)]
     pub fn expand_here<V: InstructionSet>(&mut self, tape: &Tape<D>, t: S, x: &[S; D], sides: &Sides<S>) {
-        let is_started = const { Self::IS_SINGLE } && self.is_begun(t.real(), x, sides);
+        let is_started = const { Self::IS_SINGLE } && self.is_begun(&tape.program.filled, t.real(), x, sides);
         let Self { isa, work, held, order, .. } = self;
         let order = *order;
         // The number of equations is asked so that no other program is compiled.

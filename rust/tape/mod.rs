@@ -10,7 +10,6 @@ mod dle_series;
 mod fuse;
 mod group;
 mod jet;
-mod kept;
 mod node;
 mod record;
 mod series;
