@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::linearise::invert;
+use super::link_response::Transition;
 use super::{
     Bordered, EstimateError, Estimator, FreeParameter, Linearisation, ReducedSystem, Sensor, Unknowns,
 };
@@ -110,24 +111,45 @@ where
 
     /// The cost at a point around which the record is linearised.
     fn cost(&self, point: &Unknowns<D>, linear: &Linearisation<D, M>) -> Cost {
-        let mut cost = Cost { misfit: self.misfit_cost(&linear.misfits()), ..Cost::default() };
-        let precision = self.precision();
-        for i in 0..linear.flow.len() {
-            if self.record.linked[i] {
-                let defect = &linear.flow[i].defect;
-                cost.defect += defect.component_mul(defect).dot(&precision[i]);
-            }
-        }
+        let mut cost = Cost {
+            misfit: self.misfit_cost(&linear.misfits()),
+            defect: self.defect_cost(&linear.flow),
+            ..Cost::default()
+        };
         for free in &self.free {
             cost.prior += ((point.get(free) - free.mean) / free.sd).powi(2);
         }
         cost
     }
 
-    fn look(&self, point: Unknowns<D>, room: Linearisation<D, M>) -> Result<Iterate<D, M>, EstimateError> {
-        let linear = Arc::new(self.linearise_in(&point, room)?);
+    fn defect_cost(&self, flow: &[Transition<D>]) -> f64 {
+        let precision = self.precision();
+        let mut cost = 0.0;
+        for i in 0..flow.len() {
+            if self.record.linked[i] {
+                let defect = &flow[i].defect;
+                cost += defect.component_mul(defect).dot(&precision[i]);
+            }
+        }
+        cost
+    }
+
+    /// A point whose cost is at most `limit`, or else the memory.
+    #[allow(clippy::type_complexity, reason = "memory that is returned is no error")]
+    fn look(
+        &self,
+        point: Unknowns<D>,
+        room: Linearisation<D, M>,
+        limit: f64,
+    ) -> Result<Result<Iterate<D, M>, Linearisation<D, M>>, EstimateError> {
+        // Most points that are too far off have too large defects.
+        let linear = match self.linearise_if(&point, room, |flow| self.defect_cost(flow) <= limit)? {
+            Ok(linear) => linear,
+            Err(rejected) => return Ok(Err(rejected)),
+        };
         let cost = self.cost(&point, &linear);
-        Ok(Iterate { point, linear, cost })
+        let accepted = cost.total() <= limit;
+        Ok(if accepted { Ok(Iterate { point, linear: Arc::new(linear), cost }) } else { Err(linear) })
     }
 
     /// Adds the free parameters' priors to normal equations at a point, and fixes padding states.
@@ -193,12 +215,13 @@ where
         let mut step = if *damping == 0.0 { full } else { self.step(reduced, *damping)? };
         let mut length = 1.0;
         for trial in 1..=MOST_TRIALS {
-            match self.look(self.moved(&here.point, &step, length), std::mem::take(&mut room)) {
-                Ok(new) if new.cost.total() <= here.cost.total() => {
+            let moved = self.moved(&here.point, &step, length);
+            match self.look(moved, std::mem::take(&mut room), here.cost.total()) {
+                Ok(Ok(lower)) => {
                     *damping = if *damping < 1e-2 { 0.0 } else { *damping * 0.1 };
-                    return Ok(Some(new));
+                    return Ok(Some(lower));
                 }
-                Ok(new) => room = room_of(new.linear),
+                Ok(Err(rejected)) => room = rejected,
                 Err(_) => {}
             }
             if trial == MOST_TRIALS {

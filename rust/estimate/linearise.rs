@@ -69,7 +69,8 @@ where
 {
     /// Linearises the record around a point with respect to the states and to the free parameters.
     pub fn linearise(&self, point: &Unknowns<D>) -> Result<Linearisation<D, M>, EstimateError> {
-        self.linearise_in(point, Linearisation::default())
+        let whole = self.linearise_if(point, Linearisation::default(), |_| true)?;
+        Ok(whole.unwrap_or_else(|rejected| rejected))
     }
 
     /// The same, shared; where it is [known](Estimator::known) it is not computed again.
@@ -80,20 +81,26 @@ where
         }
     }
 
-    /// The same in the memory of another: to allocate costs as much time as the work.
-    pub(super) fn linearise_in(
+    /// The same in the memory of another: to allocate costs as much time as the work. If the links are not `accepted`, the
+    /// remainder, which takes more than half of the time, is left out, and the memory is returned.
+    #[allow(clippy::type_complexity, reason = "memory that is returned is no error")]
+    pub(super) fn linearise_if(
         &self,
         point: &Unknowns<D>,
         room: Linearisation<D, M>,
-    ) -> Result<Linearisation<D, M>, EstimateError> {
+        accepted: impl FnOnce(&[Transition<D>]) -> bool,
+    ) -> Result<Result<Linearisation<D, M>, Linearisation<D, M>>, EstimateError> {
         let Linearisation { mut sights, flow, columns: ParameterJacobian { mut seen, mut state } } = room;
         let laws = self.own_laws(point);
         let plain = self.plain_laws(point);
         let mut flow = self.flow(point, &laws, &plain, flow)?;
+        if !accepted(&flow) {
+            return Ok(Err(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } }));
+        }
         let timed = self.timed(point, &plain);
         self.own_state_rows(point, &mut flow, &plain, &timed, &mut state)?;
         self.sights(point, &laws, &timed, &mut sights, &mut seen);
-        Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } })
+        Ok(Ok(Linearisation { sights, flow, columns: ParameterJacobian { seen, state } }))
     }
 
     /// The observation of every frame, and its rows of the free parameters.

@@ -245,6 +245,32 @@ impl Program {
         results[0]
     }
 
+    /// The same after [`fix`](Program::fix). `lift` makes numbers of the place from the fixed values.
+    pub fn value_after<S: Scalar, A: Scalar>(
+        &self,
+        place: &Place<'_, A>,
+        fixed: &[S],
+        lift: &impl Fn(S) -> A,
+    ) -> A {
+        let mut results = [A::zero()];
+        let first = self.states + self.leaves.len() - self.constants;
+        let end = first + self.constants + self.first.len();
+        let mut work = |work: &mut [A]| {
+            for (register, &value) in work[first..end].iter_mut().zip(&fixed[first..end]) {
+                *register = lift(value);
+            }
+            self.follow(place, &[A::mask(true); MAX_SURFACES], work, &mut results);
+        };
+        match self.room() {
+            room if room <= ROOMS[0] => work(&mut [A::zero(); ROOMS[0]]),
+            room if room <= ROOMS[1] => work(&mut [A::zero(); ROOMS[1]]),
+            room if room <= ROOMS[2] => work(&mut [A::zero(); ROOMS[2]]),
+            room if room <= ROOMS[3] => work(&mut [A::zero(); ROOMS[3]]),
+            room => work(&mut vec![A::zero(); room]),
+        }
+        results[0]
+    }
+
     #[inline(never)]
     fn run_anew<S: Scalar>(
         &self,

@@ -114,19 +114,24 @@ impl Formula {
         &self.bodies
     }
 
-    /// Adds it, with these values of its parameters, to its slot.
+    /// Computes what its parameters alone determine, for [`enter`](Formula::enter).
+    pub(super) fn fix<S: Scalar>(&self, parameters: &[S]) -> Vec<S> {
+        self.function.fix(parameters)
+    }
+
+    /// Adds it, after [`fix`](Formula::fix), to its slot.
     // One function for each kind of number, as for the library's.
     #[inline(never)]
     pub(super) fn enter<S: Scalar, A: Scalar>(
         &self,
-        values: &[S],
-        lift: &dyn Fn(S) -> A,
+        fixed: &[S],
+        lift: &impl Fn(S) -> A,
         at: &EffectInputs<A>,
         slots: &mut Contributions<A>,
     ) {
         let x: [A; QUANTITIES.len()] = std::array::from_fn(|n| at.quantity(n));
         let place = Place { t: at.t, x: &x, rates: &[], inputs: &[] };
-        let value = self.function.value_at(&place, &|i| lift(values[i]));
+        let value = self.function.value_after(&place, fixed, lift);
         match self.slot {
             Slot::Torque => slots.torque += value,
             Slot::Friction => slots.friction += value,

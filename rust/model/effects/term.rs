@@ -88,6 +88,7 @@ impl Effect {
 #[derive(Clone, Debug)]
 enum ValuedLaw<S> {
     Library(Kind, [S; MAX_PARAMETERS]),
+    /// With what its parameters determine.
     Formula(Arc<Formula>, Vec<S>),
 }
 
@@ -104,8 +105,8 @@ impl<S: Scalar> Term<S> {
     pub fn map<T: Scalar>(&self, number: impl Fn(S) -> T) -> Term<T> {
         let law = match &self.law {
             ValuedLaw::Library(kind, values) => ValuedLaw::Library(*kind, values.map(number)),
-            ValuedLaw::Formula(formula, values) => {
-                ValuedLaw::Formula(formula.clone(), values.iter().map(|&own| number(own)).collect())
+            ValuedLaw::Formula(formula, fixed) => {
+                ValuedLaw::Formula(formula.clone(), fixed.iter().map(|&value| number(value)).collect())
             }
         };
         Term { law, momentum: self.momentum, treatment: self.treatment }
@@ -124,7 +125,7 @@ impl<S: Scalar> Term<S> {
                 }
                 Source::Formula(formula) => {
                     let count = formula.parameters().len();
-                    (count, ValuedLaw::Formula(formula.clone(), values[..count].to_vec()))
+                    (count, ValuedLaw::Formula(formula.clone(), formula.fix(&values[..count])))
                 }
             };
             terms.push(Term { law, momentum, treatment });
@@ -146,7 +147,7 @@ impl<S: Scalar> Term<S> {
             ValuedLaw::Library(kind, values) => {
                 kind.enter(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
             }
-            ValuedLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
+            ValuedLaw::Formula(formula, fixed) => formula.enter(fixed, lift, at, slots),
         }
     }
 
@@ -162,7 +163,7 @@ impl<S: Scalar> Term<S> {
             ValuedLaw::Library(kind, values) => {
                 kind.slip(&vector!(A, MAX_PARAMETERS; i => lift(values[i])), at, slots)
             }
-            ValuedLaw::Formula(formula, values) => formula.enter(values, lift, at, slots),
+            ValuedLaw::Formula(formula, fixed) => formula.enter(fixed, lift, at, slots),
         }
     }
 
