@@ -134,7 +134,7 @@ where
         cost
     }
 
-    /// A point whose cost is at most `limit`, or else the memory.
+    /// The point with its linearisation if its cost is at most `limit`; otherwise the memory, for the next trial.
     #[allow(clippy::type_complexity, reason = "memory that is returned is no error")]
     fn look(
         &self,
@@ -142,7 +142,7 @@ where
         room: Linearisation<D, M>,
         limit: f64,
     ) -> Result<Result<Iterate<D, M>, Linearisation<D, M>>, EstimateError> {
-        // Most points that are too far off have too large defects.
+        // The defects alone reject most points that are too far off.
         let linear = match self.linearise_if(&point, room, |flow| self.defect_cost(flow) <= limit)? {
             Ok(linear) => linear,
             Err(rejected) => return Ok(Err(rejected)),

@@ -73,7 +73,7 @@ where
         Ok(whole.unwrap_or_else(|rejected| rejected))
     }
 
-    /// The same, shared; where it is [known](Estimator::known) it is not computed again.
+    /// The same, shared. If it is [known](Estimator::known), it is not computed again.
     pub(super) fn around(&self, point: &Unknowns<D>) -> Result<Arc<Linearisation<D, M>>, EstimateError> {
         match &self.known {
             Some(known) if *known.point == *point => Ok(known.linear.clone()),
@@ -81,8 +81,8 @@ where
         }
     }
 
-    /// The same in the memory of another: to allocate costs as much time as the work. If the links are not `accepted`, the
-    /// remainder, which takes more than half of the time, is left out, and the memory is returned.
+    /// The same in the memory of another one, because an allocation takes as much time as the work. If the links are not
+    /// `accepted`, only the memory is returned: the remainder takes more than half of the time.
     #[allow(clippy::type_complexity, reason = "memory that is returned is no error")]
     pub(super) fn linearise_if(
         &self,

@@ -33,7 +33,7 @@ pub struct StepFrom<'a, S> {
 /// The most operations: longer code is not in the cache when it is needed.
 const MOST_LINES: usize = 1 << 12;
 
-/// The numbers of the values of a step. The first ones are those of the program's registers.
+/// The numbers of the values of a step. The first ones belong to the program's registers.
 struct Values {
     states: usize,
     stages: usize,
@@ -65,8 +65,8 @@ fn number(i: usize) -> u16 {
 }
 
 impl Program {
-    /// Computes the rates at all stages of a step but the first, which is given, and the new state. Returns false without
-    /// code for it. A program has as many results as there are states; `fixed` is as for [`run`](Program::run).
+    /// Computes the rates at all stages of a step but the first, which is given, and the new state. Returns false if there is
+    /// no code for it. A program has as many results as there are states; `fixed` is as for [`run`](Program::run).
     #[inline]
     pub fn run_step<S: Scalar>(
         &self,
@@ -92,7 +92,7 @@ impl Program {
             stages.copy_from_slice(&work[first..x]);
             new.copy_from_slice(&work[values.new..values.t]);
         };
-        // Room without an allocation.
+        // Arrays on the stack save an allocation in each step.
         match values.len() {
             0..=48 => run(&mut [S::zero(); 48]),
             49..=96 => run(&mut [S::zero(); 96]),
@@ -145,7 +145,7 @@ impl Program {
 }
 
 impl Writer {
-    /// `x + h Σ_j a_j k_j` in component `n`, without the zero weights after the first.
+    /// Writes `x + h Σ_j a_j k_j` in component `n`, without the zero weights after the first.
     fn argument(&mut self, values: &Values, weights: &[f64], n: usize, to: usize) {
         for (j, &weight) in weights.iter().enumerate() {
             if j > 0 && weight == 0.0 {
@@ -166,7 +166,7 @@ impl Writer {
         self.write(number(to), Operation::Add, FIRST, x);
     }
 
-    /// The time of a stage.
+    /// Writes the time of a stage.
     fn time(&mut self, values: &Values, part: f64, to: usize) {
         let part = self.list.constant(part);
         self.list.load(FIRST, part);

@@ -30,9 +30,11 @@ enum Action {
     Apply(Operation, Value, Option<Value>, Option<Value>, Value),
     Store(usize, Place, Value),
     StoreUpper(Place, Value),
-    /// A result: a number and another one from memory, the two halves of it, or the upper half of it.
+    /// A result from a number and another one in memory.
     LoadUpper(Value, Value, Place),
+    /// A result from its two halves.
     Join(Value, Value, Value),
+    /// A result that is the upper half of a value.
     Part(Value, Value),
 }
 
@@ -49,8 +51,8 @@ impl Action {
     }
 }
 
-/// The same operations, each with the numbers that it takes at once, with as many registers; `None` if a place has
-/// several values. Elements of the work from `results` on are not needed afterwards.
+/// The same operations with this many registers. A line has a width, the count of numbers that it takes at once. Elements of
+/// the work from `results` on are not needed afterwards. `None` if a place has several values.
 pub(super) fn allocate(
     lines: &[(usize, Line)],
     registers: usize,
@@ -69,7 +71,7 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
     let (mut known, mut actions) = (Vec::<Known>::new(), Vec::with_capacity(lines.len()));
     let mut in_place = HashMap::<(Place, usize), Value>::new();
     let mut in_register = [None; 1 << u8::BITS];
-    // These are read from memory in any case.
+    // `LoadUpper` always reads memory, so these places must be stored.
     let upper = |&(_, line): &(usize, Line)| match line {
         Line::LoadUpper(_, _, place) => Some(place),
         _ => None,
@@ -247,7 +249,7 @@ impl Room {
         if own.register.is_some() || !own.saved || own.home.is_none_or(is_shared) {
             return false;
         }
-        // This use is the last but those before it.
+        // The first of these uses is the present one; the second follows it.
         match own.uses.iter().rev().nth(1) {
             None => true,
             Some(&next) => {
@@ -317,7 +319,7 @@ impl Room {
     }
 }
 
-/// How often the operands have this value.
+/// The number of operands with this value.
 fn uses_of(value: Value, operands: &[Value]) -> usize {
     operands.iter().filter(|&&other| other == value).count()
 }
@@ -388,7 +390,7 @@ mod tests {
         lines.into_iter().map(|line| (8, line)).collect()
     }
 
-    /// As many values as there are pass through eight registers, and none is lost.
+    /// More values than registers: eight registers lose none of them.
     #[test]
     fn values_in_registers_are_those_in_memory() {
         for seed in 0..60 {

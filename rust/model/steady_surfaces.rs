@@ -25,8 +25,8 @@ impl SteadySurfaces {
         Self { program: Program::of(numbers.iter().map(|&j| &kinks.surfaces[j])), numbers }
     }
 
-    /// The values that parameters alone determine, as [`suspect`](Self::suspect) takes them. None if places have to be
-    /// evaluated one after the other: they are in packets already, or a division by numbers with derivatives has other bits.
+    /// The values that parameters alone determine, as [`suspect`](Self::suspect) takes them. Empty if places have to be
+    /// evaluated one after the other: they are in packets already, or a division of numbers with derivatives has other bits.
     pub(super) fn fix<S: Scalar>(&self, values: &[S]) -> Vec<Places> {
         let alone = const { !S::SYMBOLIC && S::Real::LANES == 1 };
         if !alone || self.numbers.is_empty() || !(S::IS_PLAIN || self.program.is_ring()) {

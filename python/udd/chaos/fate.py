@@ -33,8 +33,8 @@ _RETURNS = 20.0  # Mean times between section points that show the size of a mot
 _SAMPLES = 2000
 _NOISE = 100.0  # Times the tolerance: a component that moves less is at rest.
 _GROWS = 1.3  # Growth of an unbounded motion each time that the time doubles.
-_DOUBLINGS, _SLOWEST = 8, 100  # The same of a motion that has hardly begun.
-_BEGUN = 0.5  # Share of its state by which a motion must move to show how it grows.
+_DOUBLINGS, _SLOWEST = 8, 100  # Doublings of the time; the second for a motion that has hardly begun.
+_BEGUN = 0.5  # Share of its state by which a motion must move to show its growth.
 _FAR = 1e12  # Times its first size: a motion that grew so far is unbounded.
 
 

@@ -16,16 +16,17 @@ _TURN = 2 * np.pi
 
 
 def shift_ranges(effect: Effect, final: Fit) -> dict[str, float]:
-    """Return the places and phases of an effect, with the range of what each is compared with.
+    """Return the places and phases of an effect, each with the range of its coordinate in the motion.
 
     Such a constant shifts a law along the motion: it is added to a linear function of a place, an angle or
-    the time. At zero it does not make the law simpler, as an amplitude, a rate or a speed does.
+    the time. A law is no simpler if it is zero, in contrast to an amplitude, a rate or a speed.
 
     Parameters
     ----------
     effect : Effect
+        Effect of the final model.
     final : Fit
-        Fit of all data, whose motion shows the ranges. An angle's is at most a turn.
+        Fit of all data, whose motion has the ranges. The range of an angle is at most a turn.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def _tree(text: str) -> ast.expr | None:
 
 
 def _moving(final: Fit) -> dict[str, float]:
-    """Return the ranges of the coordinates that have no natural zero, by name: not those of speeds."""
+    """Return the ranges of places, angles and the time by name; speeds have a natural zero."""
     model, record = final.model, final.record
     placed = set(model.kinematic) or {name for name in model.state_names if name != "Omega"}
     result = {}
@@ -110,7 +111,7 @@ def _span(node: ast.expr, moving: Mapping[str, float], constants: Mapping[str, f
 
 
 def _number(node: ast.expr, constants: Mapping[str, float]) -> float | None:
-    """Return the size of a number or a constant; None for anything else."""
+    """Return the absolute value of a number or a constant; None for anything else."""
     if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
         return abs(float(node.value))
     return abs(constants[node.id]) if isinstance(node, ast.Name) and node.id in constants else None

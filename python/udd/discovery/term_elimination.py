@@ -228,10 +228,10 @@ class _Pruning:
         self.unit = max(full.scatter, 1.0)
 
     def run(self) -> Fit:
-        """Remove terms, reduce the model error, exchange; from a small and from a large model error.
+        """Remove terms, reduce the model error and exchange terms.
 
-        The two remove terms in a different order, which decides between sets of terms that are almost
-        equivalent, as in ODEBench 24.
+        Terms are removed twice, from a small and from a large model error. The orders of removal differ, and
+        the better end decides between sets of terms that are almost equivalent, as in ODEBench 24.
         """
         ends = []
         for level in dict.fromkeys((self.full.level, min(self.full.level, _LOOSE))):
@@ -274,7 +274,7 @@ class _Pruning:
         return solve(fitted.problem, schedule, fitted.point)
 
     def _without(self, current: Fit, kept: str | None = None) -> Fit:
-        """Remove terms but `kept` as long as that decreases the criterion, several at a time if by far."""
+        """Remove terms except `kept` while the criterion decreases, several at a time if it falls far."""
         needed = set() if kept is None else {kept}
         while True:
             order = [(n, change) for n, change in self._order(current) if n not in needed]

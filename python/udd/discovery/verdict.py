@@ -110,7 +110,7 @@ def undetermined(added: AddedEffect, final: Fit) -> list[str]:
 
     A constant with a natural zero must be more than three standard errors from it. Amplitudes that belong
     together, such as those of a sine and a cosine, count as one. A place or a phase has no natural zero:
-    three standard errors must be less than half of the range of what it is compared with.
+    three standard errors must be less than half the range of its coordinate.
     """
     order = list(final.parameters)
     result = []

@@ -47,7 +47,8 @@ def fit(
     error. It reduces that assumed error in steps (weak-constraint multiple shooting). No data are
     differentiated, and chaotic records of any length can be fitted. The model's time counts from the
     measurement's first row. Outliers have a smaller weight, and gross ones none (``result.noise.weight``).
-    Blocks of up to 20 frames with a jump at each end have none, nor has a code far beyond all other values.
+    Blocks of up to 20 frames with a jump at each end have weight 0. So have repeated codes for missing
+    values, such as -999, if they are far beyond all other values.
 
     Parameters
     ----------

@@ -24,7 +24,8 @@ _CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide e
 _LONGEST = 20  # frames of a block
 _NOISE = 3.0  # Standard deviations by which the mean speed between two frames may be wrong.
 _AROUND, _LEAST = 5, 4  # Steps on each side of a block that show the motion's speed, and the fewest.
-#: A jump exceeds the range of the speeds around it by this times the range; a bridge by no more than this.
+#: A jump exceeds the range of the speeds around it by more than the first factor times the range. The motion
+#: across a block exceeds it by at most the second.
 _BEYOND, _BRIDGE = 2.0, 1.0
 _RARE, _FEW = 0.005, 3  # Share of the frames, or number, above which blocks are spikes of the motion.
 _CODE = 3.0  # Distance of a code from the other values, in ranges of these.
@@ -109,7 +110,7 @@ class _Steps(NamedTuple):
     def ranges(self, width: int) -> tuple[Array, Array]:
         """Return the least and largest speed in so many steps before and after each frame, (n, m, 2) each.
 
-        They are NaN where fewer than a few of these steps exist, because a run begins or ends.
+        They are NaN near the ends of a run, where fewer than `_LEAST` of these steps exist.
         """
         inside = (np.diff(self.run) == 0)[:, None]
         pad, window = ((width, width), (0, 0)), (width, 0)
@@ -204,7 +205,7 @@ def _blocks(t: Array, x: Array, sigma: Array, run: NDArray[np.int64]) -> list[_B
 
 
 def _blocks_of(steps: _Steps, starts: NDArray[np.int64], length: int) -> Iterator[_Block]:
-    """Find blocks of so many frames that begin at one of the `starts`, that with the clearest jumps first."""
+    """Yield the blocks of so many frames that begin at one of the `starts`."""
     first, last = starts - 1, starts + length
     before, after = (
         side[at] for side, at in zip(steps.ranges(max(length, _AROUND)), (first, last), strict=True)

@@ -37,6 +37,11 @@ def pictures_at(
     list of ndarray of uint8, shape (height, width, 3)
         In the order of `frames`.
 
+    Raises
+    ------
+    TrackError
+        The film cannot be read, or has no frame with one of these numbers.
+
     See Also
     --------
     udd.tracking.pictures_between : frames by their times.
@@ -78,7 +83,8 @@ def pictures_between(
 ) -> Iterator[NDArray[np.uint8]]:
     """Yield the frames nearest to increasing times, as RGB arrays.
 
-    Frames long before them are not decoded.
+    Frames long before them are not decoded, unless `tracked` has a correction. If the film ends before a
+    time, its last frame is nearest.
 
     Parameters
     ----------
@@ -94,6 +100,11 @@ def pictures_between(
     ndarray of uint8, shape (height, width, 3)
         One frame for each time.
 
+    Raises
+    ------
+    TrackError
+        The film cannot be read.
+
     See Also
     --------
     udd.tracking.pictures_at : frames by their numbers.
@@ -106,7 +117,7 @@ def pictures_between(
     film, wanted = _as_tracked(video, tracked), iter(t.tolist())
     want = next(wanted, None)
     before: Picture | None = None
-    # a camera's motion is known by the frames' numbers, which count from where decoding begins
+    # A correction has one entry per frame, and frames are counted from where decoding begins.
     for picture in film.pictures(float(t[0]) if film.correct is None else 0.0):
         while want is not None and before is not None and picture.t > want:
             nearest = before if want - before.t < picture.t - want else picture

@@ -34,8 +34,8 @@ from udd.video.reader import Film, TrackError
 from .options import TrackOptions
 
 Array = NDArray[np.float64]
-GLUED = 0.3e-3  # m: the marks' middle against the disk's, if the rim does not show
-UNSURE = 0.005  # of the disk's radius: a position known no better is not given
+GLUED = 0.3e-3  # m: error of the marks' middle as the disk's centre, if the rim is not seen
+UNSURE = 0.005  # share of the disk's radius: a position with a larger standard error is vague
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class _Upright:
     camera: Camera
     rim: Rim | None
     wobble: Wobble
-    shared: list[Array]  # standard errors (n, 3) of u, v and beta of one cause each, signed alike
+    shared: list[Array]  # for each cause the errors (n, 3) of u, v and beta, with signs: fully correlated
 
 
 def to_metres(
@@ -89,7 +89,7 @@ def to_metres(
     look_over: Survey | None = None,
     moved: CameraMotion | None = None,
 ) -> Tracking:
-    """Return the measurement in metres, without vague and gone frames; `twice`: of two passes."""
+    """Return the measurement in metres, without vague and gone frames; `twice` is True after two passes."""
     if moved is not None and not moved.steady:
         why = lost("the background is not seen, and the camera moves")
         tracks = tracks.without(~moved.is_measured[: len(tracks)], why)
@@ -98,7 +98,7 @@ def to_metres(
     drive = complex(np.conj(camera.drive)) * camera.scale
     turns = count_turns(tracks.t, tracks.centre, tracks.angle, camera.pivot, drive, disk.state.look.reach)
     tracks = replace(tracks, angle=turns.angle)
-    # where the layout is taken as said, so is the centre
+    # a given layout also gives the centre
     by_hand = 0.0 if rim is not None and options.calibrate.layout else options.sigma.layout
     if rim is None and options.layout.standard:
         by_hand = GLUED
@@ -140,10 +140,10 @@ def to_metres(
 
 
 def _separation_noise(film: Film, count: int) -> Array:
-    """Return the variance of each frame's errors against those of a coded frame (count,).
+    """Return the variance of each frame's errors relative to a coded frame's, (count,).
 
-    The errors of coded frames are independent, so those of separated frames add up. Codecs move all marks
-    alike where a disk hardly moves. The marks' agreement does not show this part.
+    The errors of coded frames are independent, so those of separated frames add up. If a disk hardly moves,
+    codecs move all its marks alike, and the agreement of the marks does not show this error.
     """
     if film.conversion is None:
         return np.ones(count)
@@ -169,7 +169,7 @@ def _upright(
     twice: bool,
     look_over: Survey | None,
 ) -> _Upright:
-    """Find scale and contact, and undo a wobble if there is one."""
+    """Estimate scale and contact, and correct a wobble if it is significant."""
 
     def camera() -> Camera:
         return camera_of(tracks, state, size_of(state.look.places, rim, options), options)
@@ -180,7 +180,7 @@ def _upright(
     stood = correct_wobble(tracks, state.look, turned) if turned.amplitude else None
     if stood is None:
         return _Upright(tracks, state, before, rim, turned, shared)
-    if twice:  # a mark is placed best where it is looked for ("wobble": 7 rather than 35 micrometres)
+    if twice:  # marks are fitted where the wobble puts them: errors of 7 in place of 35 micrometres
         state = replace(state, look=stood.look)
         tracks = second_pass(film, state, stood.tracks, look_at=stood.look_at)
         stood = correct_wobble(tracks, state.look, turned, stood) or stood
@@ -195,7 +195,7 @@ def _upright(
 def _rim_upright(
     look_over: Survey, stood: WobbleCorrection, state: TrackerState, rim: Rim, options: TrackOptions
 ) -> Rim:
-    """Measure the rim again, from frames with a known foreshortening; its centre from its former place."""
+    """Measure the rim again, with the foreshortening of each frame; the centre is relative to the former."""
     tracks, around = stood.tracks, LocalMotion(stood.tracks)
     frames = []
     for picture in look_over.pictures:

@@ -37,8 +37,8 @@ const HALF: Register = Register(4);
 /// The sign bit.
 const SIGN: Register = Register(15);
 
-/// Code for the coefficients of the orders 1 to `order`, with room for `room` of them in each series. Behind the slots single
-/// trajectories have the plan's rows and held values, and all have sums: so many [`numbers`].
+/// Code for the coefficients of the orders 1 to `order`, with room for `room` of them in each series. Behind the slots are the
+/// plan's rows and held values, for single trajectories only, and the sums. [`numbers`] counts them all.
 pub(super) fn series(program: &Program, isa: Isa, lanes: usize, room: usize, order: usize) -> Option<Code> {
     let rows = program.slots * room;
     let held = rows + MOST * program.plan.rows.len() * room;
@@ -62,7 +62,7 @@ pub(super) fn series(program: &Program, isa: Isa, lanes: usize, room: usize, ord
         }
     }
     code.list.end();
-    // The other series are only steps on the way.
+    // The other series are intermediate results.
     if code.list.allocate(program.components() * room) { Code::new(code.list) } else { None }
 }
 
@@ -200,16 +200,16 @@ impl Series {
         self.list.store(self.place(n, self.k + 1), C);
     }
 
-    /// Adds `a b` to the sum in a register, if there is one yet; returns that there is.
+    /// Adds `a b` to the sum in a register, or begins the sum if there is not `any`. Returns true: now there is one.
     fn with(&mut self, sum: Register, any: bool, a: (u16, usize), b: (u16, usize)) -> bool {
         self.load(FACTOR, a.0, a.1);
         let b = self.place(b.0, b.1);
         self.times(sum, any, FACTOR, b)
     }
 
-    /// The same where the factor `a` is loaded.
+    /// The same with the factor `a` in a register.
     fn times(&mut self, sum: Register, any: bool, a: Register, b: impl Into<Operand>) -> bool {
-        // Adding to -0 changes nothing.
+        // An empty sum is -0, and adding that changes nothing.
         match any {
             true => self.list.apply(Operation::Fused, sum, a, b),
             false => self.list.apply(Operation::Mul, sum, a, b),

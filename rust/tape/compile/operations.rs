@@ -75,7 +75,7 @@ impl Series {
     pub(super) fn first(&mut self, step: Step) -> Option<()> {
         let to = step.to;
         match step.node {
-            // Done with the sine and the tangent.
+            // Computed together with the sine or the hyperbolic tangent.
             Node::Cos(_) | Node::CosOfTime(_) | Node::Slope(_) => return Some(()),
             Node::Hold(h) => self.list.load(C, self.held(h)),
             Node::Select(side, a, b) => self.select(side, a, b),
@@ -101,7 +101,7 @@ impl Series {
         Some(())
     }
 
-    /// A number over a coefficient as the factor, stored too.
+    /// Puts a number divided by a coefficient into the factor, and stores it.
     fn inverse(&mut self, number: f64, of: (u16, usize), to: u16) {
         let number = self.list.constant(number);
         self.list.load(FACTOR, number);
@@ -110,7 +110,7 @@ impl Series {
         self.list.store(self.place(to, 0), FACTOR);
     }
 
-    /// `c` by the side of a surface.
+    /// Chooses `c` from two series by the side of a surface.
     fn select(&mut self, side: u16, a: u16, b: u16) {
         use Operation::{And, AndNot, Or};
         self.list.load(MASK, Place(Array::Sides, usize::from(side)));
@@ -215,7 +215,7 @@ impl Series {
         self.store(to);
     }
 
-    /// The coefficient of a series' derivative as the factor; `c` stays.
+    /// Puts a coefficient of a series' derivative into the factor. `c` does not change.
     fn weighted(&mut self, a: u16) {
         let weight = self.list.constant(self.k as f64);
         self.load(FACTOR, a, self.k);

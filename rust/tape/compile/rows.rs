@@ -5,7 +5,7 @@ use crate::machine::{Array, Place};
 use crate::tape::group::{MOST, Plan, Task, Work};
 
 impl Series {
-    /// Fills rows with what is known before the first order.
+    /// Fills the rows with the coefficients that are known before the first order.
     pub(super) fn begin(&mut self, plan: &Plan, components: usize) {
         for (i, values) in plan.held.iter().enumerate() {
             let places: Vec<_> = values.iter().map(|&h| Place(Array::Held, usize::from(h))).collect();

@@ -28,7 +28,7 @@ pub(in crate::tape) fn numbers(program: &Program, room: usize, is_single: bool) 
 }
 
 impl Series {
-    /// [`inner`](crate::tape::series::inner) in `c`; returns whether it is not empty.
+    /// [`inner`](crate::tape::series::inner) in `c`; returns false if it is empty.
     pub(super) fn inner(&mut self, a: u16, b: u16) -> bool {
         let (k, begin) = (self.k, self.first_of_sums());
         let (mut even, mut odd) = self.sum_ahead(a, Some(b));
@@ -45,7 +45,7 @@ impl Series {
         even
     }
 
-    /// [`inner_square`](crate::tape::series::inner_square) in `c`; returns whether it is not empty.
+    /// [`inner_square`](crate::tape::series::inner_square) in `c`; returns false if it is empty.
     pub(super) fn inner_square(&mut self, a: u16) -> bool {
         let (k, begin) = (self.k, self.first_of_sums());
         let (mut any, _) = self.sum_ahead(a, None);
@@ -66,8 +66,8 @@ impl Series {
         self.k - (self.k - 1) % TOGETHER
     }
 
-    /// Puts what is begun of a product's sums, or of a square's if there is no second factor, into `c` and the odd one; returns
-    /// whether there are any.
+    /// Loads the begun sums of a product into `c` and the odd one; those of a square if there is no second factor. Returns
+    /// true for each that exists.
     fn sum_ahead(&mut self, a: u16, b: Option<u16>) -> (bool, bool) {
         let (k, product) = (self.k, self.product);
         self.product += 1;

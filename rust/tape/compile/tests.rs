@@ -25,7 +25,7 @@ const LAWS: [[&str; 3]; 9] = [
     ["y", "-x^3 + c*(z - x) - k*y", "-z^3 + k*(x - z) - c*y + sqrt(1 + x^2) - sqrt(2 + y^2)"],
 ];
 
-/// The bits of the state's series, interpreted and by machine code. All numbers that are no numbers have the same bits.
+/// The bits of the state's series, interpreted and by machine code. Here all NaNs have the same bits.
 fn both_ways<S: Real>(tape: &Tape<3>, isa: Isa, order: usize, x: [S; 5]) -> Option<[Vec<u64>; 2]> {
     let (program, sides) = (&tape.program, from_fn(|j| S::mask(j % 2 == 1)));
     let code = series(program, isa, S::LANES, ROOM, order)?;

@@ -203,7 +203,7 @@ def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
 def scored_forcings(
     fit: Fit, candidates: Sequence[Candidate], column: Callable[[Candidate], NDArray[np.float64] | None]
 ) -> list[Scored]:
-    """Score candidates by their forcings, as `column` computes them; it returns None for an undefined one."""
+    """Score candidates by their forcings. `column` computes a forcing, or returns None if it is undefined."""
     scatter = max(fit.scatter, 1.0)
     result: list[Scored] = []
     for first in range(0, len(candidates), _FORCINGS):

@@ -71,7 +71,7 @@ def _read_fixed(text: str) -> tuple[Node, list[float]]:
 
 
 def regression(curve: Curve, most: int, seed: int) -> list[tuple[Node, list[float]]]:
-    """Run symbolic regression with at most so many constants; return nothing if pyoperon is not installed."""
+    """Run symbolic regression with at most `most` constants; the list is empty without pyoperon."""
     if curve.splines[0].periodic:
         return []  # a formula of an angle must be periodic, as waves and bumps are
     try:

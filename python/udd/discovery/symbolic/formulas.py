@@ -82,12 +82,12 @@ class Formula:
 def formulas_for(
     curve: Curve, observations: int, seed: int = 0, taken: Collection[str] = ()
 ) -> list[Formula]:
-    """Search short formulas for a curve of one coordinate, the most probable first; none for a surface.
+    """Search short formulas for a curve of one coordinate by regression and by usual forms.
 
     Usual forms (powers, steps, bumps, waves) and those from symbolic regression (pyoperon, if installed) are
     fitted to the curve's coefficients with their full information, which accounts for confounding with the
-    free parameters. Each constant has its cost in the Bayesian
-    information criterion, each operation its description length. Needless constants are removed.
+    free parameters. Each constant has its cost in the Bayesian information criterion, each operation its
+    description length. Needless constants are removed.
 
     Parameters
     ----------
@@ -98,6 +98,12 @@ def formulas_for(
         Seed of the regression.
     taken : collection of str
         Names that constants may not have: those of a model's states.
+
+    Returns
+    -------
+    list of Formula
+        The most probable first, without those that are less probable by `EVIDENCE_MARGIN`. Empty for a
+        surface.
     """
     if len(curve.coordinates) != 1:
         return []

@@ -22,32 +22,32 @@ from .frame_flags import unusable
 from .survey import Survey
 
 Array = NDArray[np.float64]
-POINTS = 300  # of a picture that are tried
-CONTRAST = (0.005, 0.001)  # of the strongest point that the others have; the weaker ones if the first fail
+POINTS = 300  # points of a picture that are tried
+CONTRAST = (0.005, 0.001)  # least contrast of a point, share of the strongest; the second if the first fails
 LARGE = 2e6  # pixels: larger pictures, as of 4K, are reduced by a whole factor ...
 SMALL = 1.3e5  # pixels: and once more until points are searched for
 LEARNED = 40  # pictures that show which of them belong to the background
-EXISTS = 0.3  # share of the pictures in which strong points show the background; without it there is none
-OFTEN = 0.35  # share of these in which such a point goes with the others
-FEWEST = 10  # points that must go the same way
-SHARE = 0.25  # of all that can be followed that must
-BACK = 0.7  # pixels by which a point may come back elsewhere when it is followed back
+EXISTS = 0.3  # share of the pictures in which strong points show the background; below it there is none
+OFTEN = 0.35  # share of these pictures in which a point of the background moves with the others
+FEWEST = 10  # points that must have the common motion
+SHARE = 0.25  # share of the points that can be followed that must have it
+BACK = 0.7  # pixels by which a point may miss its start when it is followed back
 OFF = 0.7  # pixels by which a point may miss the common motion
-PATCH = 5  # pixels about a point whose light is compared
-WINDOW = 15  # pixels
-KNOWN, ALL = 0.8, 0.98  # share of the pictures whose view is known; with less, they are other points
-UNSURE = 0.06  # pixels: a view known no better is none
+PATCH = 5  # side of the square about a point whose light is compared [pixels]
+WINDOW = 15  # side of the square by which a point is followed [pixels]
+KNOWN, ALL = 0.8, 0.98  # share of the pictures whose view must be known; above the second no others are tried
+UNSURE = 0.06  # pixels: a view with a larger standard error is not used
 UNLIKE = 0.03  # relative difference of light that is evened out before points are followed
 ZOOMS = tuple(1.12**k for k in (1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6))  # that are tried if all else fails
 MOST_FAILED = 5  # pictures in a row after which other zooms are tried in every ...
 SELDOM = 20  # ... so many pictures only
 NOWHERE = (complex(np.nan, np.nan), complex(np.nan, np.nan), np.nan, (np.nan, np.nan, np.nan))
-LEAST = 0.01  # pixels: no point is followed better
+LEAST = 0.01  # least error of a point's place [pixels]
 Row = tuple[complex, complex, float, tuple[float, float, float]]  # of one frame: as the fields of the motion
 
 
 def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
-    """Return how the camera moved; None if it was at rest, or if nothing about the disk shows it.
+    """Return the motion of the camera; None if it was at rest, or if the background does not show it.
 
     Pictures of the survey decide which points belong to the background, and whether they move at all; only
     then are they followed through the film.
@@ -58,7 +58,7 @@ def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     best, share, most = None, KNOWN, 0.0
     for contrast, part in product(CONTRAST, (0.0, 0.5, 1.0)):  # after a zoom another picture may show more
         if contrast < CONTRAST[0] and most < EXISTS:
-            break  # weak points of the disk itself may go the same way
+            break  # weak points of the disk itself may move together
         background = Background(whole[round(part * (len(whole) - 1))].y, film.light, contrast)
         seen = background.follow(whole[::2]) if background.learned(whole) else None
         if seen is None:
@@ -121,7 +121,7 @@ class Background:
         self.spread = np.ones(len(points)) if spread is None else spread  # of each one's place [pixels]
 
     def learned(self, pictures: Sequence[Picture]) -> bool:
-        """Keep the points that go with most others in most pictures; False if there are too few."""
+        """Keep the points that move with most others in most pictures; return False if too few do."""
         if len(self.points) < FEWEST:
             return False
         votes, squares, count = np.zeros(len(self.points)), np.zeros(len(self.points)), 0
@@ -149,7 +149,7 @@ class Background:
         return about_median(CameraMotion(factor, shift, gain, sigma * [n, n, 1], place, n))
 
     def _seen(self, y: Plane) -> _Seen | None:
-        """One picture's view, and the points that show it; None where too few agree."""
+        """Return the view of a picture with the points that show it; None if too few agree."""
         large = _reduced(y, self.reduction)
         y = _reduced(large, self.coarseness)
         brighter = float(np.median(self.first[::4, ::4])) / max(float(np.median(y[::4, ::4])), 1.0)
@@ -183,7 +183,7 @@ class Background:
         gain: float,
         brighter: float,
     ) -> _Seen | None:
-        """Return the present view as the larger picture shows it; None where too few points agree."""
+        """Return the present view as the larger picture shows it; None if too few points agree."""
         n, (factor, shift) = self.coarseness, self.view
         corner = (0.5 + 0.5j) * (n - 1)  # the middle of a reduced pixel
         rows, first, there = fine.compare(
@@ -195,7 +195,7 @@ class Background:
         return _Seen((factor, shift, gain, sigma), used[rows], rest)
 
     def _guesses(self, y: Plane) -> Iterator[tuple[complex, complex, Plane]]:
-        """Views to start from, and the picture as it would be from the first one's."""
+        """Yield views to start from, and the picture as the first frame's camera would show it then."""
         factor, shift = self.view
         yield factor, shift, _seen_from(y, factor, shift)
         if abs(factor - 1) + abs(shift) > 0.5:
@@ -206,7 +206,7 @@ class Background:
                 yield *guess, _seen_from(y, *guess)
 
     def _follow(self, y: Plane) -> tuple[NDArray[np.intp], NDArray[np.float32]] | None:
-        """Points that go the same way from the first picture into this one, and where they are in it."""
+        """Return the points that have the common motion since the first picture, and their places in `y`."""
         import cv2
 
         how = {"winSize": (WINDOW, WINDOW), "maxLevel": 3}
@@ -273,9 +273,10 @@ def _seen_from(y: Plane, factor: complex, shift: complex) -> Plane:
 def _similar(
     body: NDArray[np.complex128], seen: NDArray[np.complex128], spread: Array, middle: complex
 ) -> tuple[complex, complex, NDArray[np.complex128], tuple[float, float, float]]:
-    """Least squares of a turn, a factor and a shift, points that are off by more than usual counting less.
+    """Fit a turn, a factor and a shift by least squares, with smaller weights for points that are far off.
 
-    Returns these, what is left at each point, and standard errors of u and v at `middle` and of the turn.
+    Returns them (the turn and the factor as a complex factor), the residual of each point, and the standard
+    errors of u and v at `middle` and of the turn.
     """
     weight = spread**-2.0
     for _ in range(4):

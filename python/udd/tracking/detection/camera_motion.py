@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from udd.tracking.correction import Correction
 
 Array = NDArray[np.float64]
-SURE = 5.0  # standard errors by which a view may be off without being another
+SURE = 5.0  # standard errors by which equal views may differ
 STEADY = 0.2  # pixels: a camera that moves less is at rest
-AS_BRIGHT = 0.15  # relative change of light up to which all is taken as it is
-PLACED, TURNED = (
-    0.007,
-    0.05,
-)  # reduced pixels, at the middle and at the corner: errors that change with the view
+AS_BRIGHT = 0.15  # relative change of light that is not corrected
+# errors that change with the view, at the middle and at the corner [reduced pixels]
+PLACED, TURNED = 0.007, 0.05
 AROUND = 2  # frames on each side that show whether the camera rests
 REST, RESTING = 20, 0.95  # frames that a rest lasts at least, and the share of them with the same view
 

@@ -1,4 +1,4 @@
-"""Places of background points in a picture, from its full resolution and a view that is nearly right."""
+"""Places of background points in a picture of full resolution, from an approximate view."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class FinePlaces:
     def compare(
         self, y: Plane, points: Complexes, factor: complex, shift: complex, brighter: float
     ) -> tuple[NDArray[np.intp], Complexes, Complexes]:
-        """Compare points of the first picture with one that has nearly this view.
+        """Locate points of the first picture in a picture `y` that has approximately this view.
 
-        `brighter` multiplies the codes of `y`. Returns the numbers of the points that are followed, a
-        place in the first picture near each, and where that place lies in `y`.
+        `brighter` multiplies the codes of `y`. Returns the numbers of the located points, a place in the
+        first picture near each, and the same place in `y`.
         """
         import cv2
 

@@ -14,12 +14,12 @@ from .tracks import Tracks
 
 Array = NDArray[np.float64]
 EACH_SIDE = 2  # neighbours on each side
-NEAR = 3.5  # intervals within which a neighbour tells anything
-LONG = 25.0  # pixels; longer streaks are gone over once more, with what their neighbours turned out to be
-WEAK_MARKS = 3  # a long streak with fewer marks does not speak for its neighbours
-WEAK_OFF = 2.0  # pixels; nor does one whose marks disagree by more
-# where the second derivative jumps, as friction makes it where a disk turns back: its error times interval^2
-# against the miss, rms over the times at which it may jump, for the mean over a whole interval
+NEAR = 3.5  # intervals: neighbours farther away are not used
+LONG = 25.0  # pixels: longer streaks are fitted once more, from the refined poses of their neighbours
+WEAK_MARKS = 3  # a long streak with fewer marks is not used for its neighbours
+WEAK_OFF = 2.0  # pixels: the same for one whose marks disagree by more
+# Friction makes the second derivative jump when a disk turns back. The error of its mean over an interval,
+# times interval^2, is this factor of the leave-one-out residual (rms over the times of the jump).
 JUMP = 1.10
 
 
@@ -40,7 +40,7 @@ class Local:
 
 
 def weak(tracks: Tracks) -> NDArray[np.bool_]:
-    """Frames with long streaks of too few marks, or of marks that disagree."""
+    """Return True for frames with a long streak of too few marks, or of marks that disagree."""
     used = np.array([np.isfinite(c).sum() for c in tracks.chi2])
     off = np.array([np.nanmax(np.abs(x), initial=0.0) for x in tracks.residuals])
     long = tracks.streak > LONG
@@ -48,11 +48,12 @@ def weak(tracks: Tracks) -> NDArray[np.bool_]:
 
 
 def interpolation_error(tracks: Tracks, variance: float) -> Array:
-    """Standard errors (n, 3) of u, v, beta, signed alike, from paths between frames that are not quite known.
+    """Estimate the errors (n, 3) of u, v, beta from the unknown paths between frames, with their signs.
 
     A streak shows the mean of its path. The distance from its middle is half the second derivative times the
-    variance of the time [s^2] of the exposure. The polynomials that tell this derivative do not know
-    what happens between frames; how far they miss the frame itself when it is left out shows how much.
+    variance of the time [s^2] of the exposure. Polynomials through the neighbours give this derivative, but
+    they do not follow the motion between frames. Their residual at the frame itself, left out, shows their
+    error.
     """
     around = LocalMotion(tracks)
     factor = 0.5 * JUMP * variance / around.interval**2
@@ -61,12 +62,11 @@ def interpolation_error(tracks: Tracks, variance: float) -> Array:
 
 
 def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array:
-    """Covariances (n, 3, 3) of poses in the middle of paths whose bending poses with those errors told.
+    """Compute the covariances (n, 3, 3) of poses at mid-exposure from those of the means over the exposure.
 
     The distance of a path's mean from its middle, half the second derivative times `variance` [s^2], is
-    subtracted. That derivative has the errors of the frame itself, against the sign, and of its neighbours:
-    of a
-    shutter that is open all the time they make the pose worse by a tenth.
+    subtracted. That derivative has the errors of the neighbours, and those of the frame itself with the
+    opposite sign. With a shutter that is open all the time they increase the pose's error by a tenth.
     """
     around, out = LocalMotion(tracks), covariance.copy()
     good = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
@@ -79,7 +79,7 @@ def to_mid_exposure(tracks: Tracks, covariance: Array, variance: float) -> Array
 
 
 class LocalMotion:
-    """A first pass, to be looked at around each of its frames."""
+    """The motion around each frame, from the poses of a first pass."""
 
     def __init__(self, tracks: Tracks, interval: float | None = None) -> None:
         self.t = tracks.t
@@ -98,7 +98,7 @@ class LocalMotion:
         return rows[np.abs(x) < NEAR], x[np.abs(x) < NEAR], tracked
 
     def leave_one_out_residual(self, k: int) -> tuple[complex, float]:
-        """Return how centre and angle differ from the neighbours' prediction; 0 if these are too few."""
+        """Return the differences from the neighbours' prediction (centre, angle); 0 if they are too few."""
         rows, x, _ = self._neighbours(k)
         others = rows != k
         if others.all() or others.sum() < 2:
@@ -109,14 +109,14 @@ class LocalMotion:
         return complex(self.centre[k] - centre), float(self.angle[k] - angle)
 
     def bending(self, k: int) -> tuple[NDArray[np.intp], Array]:
-        """Frames that tell the second derivative at a frame that is tracked, and their weights [1 / s^2]."""
+        """Return the frames that give the second derivative at a frame, and their weights [1 / s^2]."""
         rows, x, tracked = self._neighbours(k)
         if len(rows) < 3 or not tracked:
             return np.array([k]), np.zeros(1)
         return rows, 2 * np.linalg.inv(np.vander(x, len(x), increasing=True))[2] / self.interval**2
 
     def at(self, k: int) -> Local | None:
-        """Polynomials through the nearest poses on both sides; None where too few are near."""
+        """Interpolate by polynomials through the nearest poses on both sides; None if too few are near."""
         rows, x, tracked = self._neighbours(k)
         if len(rows) < 3 or (not tracked and not (x.min() < 0 < x.max())):
             return None

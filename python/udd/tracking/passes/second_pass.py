@@ -37,10 +37,10 @@ def refine(
 ) -> Tracks:
     """Fit every frame again from what the first pass says about it and its neighbours.
 
-    A frame that the second pass does not hold, or puts elsewhere, keeps the first pass's pose. One that
-    the first pass lost between two that it tracked is tried from these. `again`: frames with long streaks,
-    and lost ones, are fitted once more as soon as their neighbours are. `look_at` gives each frame's
-    appearance if it is not always the same.
+    If the second pass cannot fit a frame, or puts it elsewhere, the frame keeps its first pose. A frame that
+    the first pass lost between two tracked ones is predicted from these. With `again`, frames with long
+    streaks and lost frames are fitted once more, after their neighbours. `look_at` gives the appearance in
+    each frame if it changes.
     """
     refiner = Refiner(state, first, again, look_at)
     observe(film, [refiner], tick)
@@ -107,7 +107,7 @@ def _refined(
     around: LocalMotion,
     tracks: Tracks,
 ) -> FrameTrack | None:
-    """Return a frame fitted from what its neighbours say; None if it does not hold."""
+    """Return a frame fitted from its neighbours' motion; None if the fit fails a check."""
     if tracks.flag[k] and not is_lost(tracks.flag[k]):
         return None
     here = around.at(k)
@@ -124,12 +124,12 @@ def _refined(
     if away > (APART if here.tracked else FORESEEN_APART) + APART_BY_STREAK * streak:
         return None
     if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.tracked:
-        return None  # two pale streaks agree with much
+        return None  # two pale streaks fit in many places
     return found_in(float(tracks.t[k]), fit, pose, streak, "refined")
 
 
 def drop_weak(tracks: Tracks) -> Tracks:
-    """Give up the frames in which a long streak of two marks is all there is: it fits in many places."""
+    """Mark frames as lost if they have only a long streak of too few marks, which fits in many places."""
     why, marks = lost("too few marks in a long streak"), tracks.chi2.shape[1]
     return tracks.with_frames(
         {
