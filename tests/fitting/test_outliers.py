@@ -171,6 +171,47 @@ def test_events_of_a_motion_are_no_outliers(name: str, noise: float) -> None:
     assert not odd_frames(t, x[:, None], np.array([noise]), linked).any()
 
 
+LONG = np.arange(0, 20, 0.02)
+SINCE = np.maximum(LONG - 5.0, 0.0)
+LEVELS = np.round(2 * np.exp(-LONG / 3) * np.sin(2 * LONG)) / 2
+#: Motions with their noise, that a detector of jumps or of codes must leave alone.
+CLEAN = {
+    "two pulses": (sum(np.exp(-(((LONG - c) / 0.04) ** 2) / 2) for c in (5.0, 12.3)), 1e-7),
+    "two narrow pulses": (sum(np.exp(-(((LONG - c) / 0.02) ** 2) / 2) for c in (5.006, 12.314)), 1e-4),
+    "a burst": (np.sin(30 * SINCE) * np.exp(-SINCE / 0.03), 1e-7),
+    "a few levels": (LEVELS, 0.0),
+}
+
+
+@pytest.mark.parametrize("name", CLEAN)
+def test_a_block_that_begins_gradually_is_a_part_of_the_motion(name: str) -> None:
+    x, noise = CLEAN[name]
+    x = x + noise * np.random.default_rng(0).normal(size=len(x))
+    odd = odd_frames(LONG, x[:, None], np.array([noise + 1e-7]), np.ones(len(x) - 1, dtype=bool))
+    assert not odd.any()
+
+
+@pytest.mark.parametrize("rest", [300, 500, 800])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_level_at_which_the_motion_rests_is_no_code(rest: int, is_first: bool) -> None:
+    x = 5 + 0.1 * np.sin(2 * LONG) + 0.01 * np.random.default_rng(0).normal(size=len(LONG))
+    x[:rest] = -9.0
+    x = x if is_first else x[::-1].copy()
+    # An exact rest does not show the noise.
+    assert not odd_frames(LONG, x[:, None], np.array([1e-5]), np.ones(len(x) - 1, dtype=bool)).any()
+
+
+@pytest.mark.parametrize("noise", [1e-7, 1e-3])
+def test_fast_switches_that_recur_are_no_outliers(noise: float) -> None:
+    """Some last as long as a block of outliers, others are longer."""
+    relaxing = udd.Model(["x", "v"], ["v", "mu*(1 - x^2)*v - x"], {"mu": 50.0})
+    t = np.arange(0, 400, 2.0)
+    x = udd.simulate(relaxing, t, [2.0, 0.0]).state[:, 0]
+    x = x + noise * np.random.default_rng(0).normal(size=len(t))
+    odd = odd_frames(t, x[:, None], np.array([noise]), np.ones(len(t) - 1, dtype=bool))
+    assert not odd.any()
+
+
 @pytest.mark.parametrize("step", [0.1, 0.15])
 def test_spikes_of_a_motion_are_no_outliers(step: float) -> None:
     relaxing = udd.Model(["x", "v"], ["v", "mu*(1 - x^2)*v - x"], {"mu": 10.0})

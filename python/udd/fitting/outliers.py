@@ -30,6 +30,11 @@ _BEYOND, _BRIDGE = 2.0, 1.0
 _RARE, _FEW = 0.005, 3  # Share of the frames, or number, above which blocks are spikes of the motion.
 _CODE = 3.0  # Distance of a code from the other values, in ranges of these.
 _REPEATS, _VALUES = 3, 10  # The fewest frames with a code, and the fewest other values.
+_MOST = 0.25  # Share of the frames above which codes or blocks are a part of the motion.
+# An outlier at an end of a block is off by this share of the largest distance, or the path of the block is
+# longer than up and down once by this factor.
+_ABRUPT, _ONCE = 0.2, 1.2
+_AS_FAST = 0.5  # Share of a jump's speed above which another step is such a jump too.
 
 
 def odd_frames(t: Array, guess: Array, sigma: Array, linked: Flags) -> Flags:
@@ -51,6 +56,7 @@ def odd_frames(t: Array, guess: Array, sigma: Array, linked: Flags) -> Flags:
         True for frames in which any channel is an outlier.
     """
     codes = np.any([_codes(channel) for channel in guess.T], axis=0)
+    sigma = np.maximum(sigma, [_rounding(channel) for channel in guess.T])
     odd = _odd_blocks(t, guess, sigma, linked, codes)
     odd |= _odd_ends(guess, sigma, linked)
     return _odd_singles(t, guess, sigma, linked, odd)
@@ -69,19 +75,29 @@ def akima(at: Array, there: Array, column: Array) -> Array:
 
 
 def _codes(x: Array) -> Flags:
-    """Detect a code for missing values: a repeated extreme value far beyond the range of all others."""
+    """Detect a code for missing values: a repeated extreme value far beyond the range of all others.
+
+    A value of many frames is no code: the motion rests there, such as a tank that is empty at first.
+    """
     odd = np.zeros(len(x), dtype=bool)
     values, counts = np.unique(x, return_counts=True)
     while len(values) > _VALUES:
         for end, rest in ((0, values[1:]), (-1, values[:-1])):
             gap = abs(values[end] - rest[end])
-            if counts[end] >= _REPEATS and gap > _CODE * np.ptp(rest):
+            if _REPEATS <= counts[end] <= _MOST * len(x) and gap > _CODE * np.ptp(rest):
                 odd |= x == values[end]
                 values, counts = rest, counts[1:] if end == 0 else counts[:-1]
                 break
         else:
             break
     return odd
+
+
+def _rounding(x: Array) -> float:
+    """Return the noise that the resolution of a channel causes; it is near 0 if values hardly repeat."""
+    steps = np.diff(np.unique(x))
+    steps = steps[steps > 8 * np.finfo(np.float64).eps * np.abs(x).max()]
+    return float(steps.min()) / np.sqrt(12.0) if len(steps) else 0.0
 
 
 class _Steps(NamedTuple):
@@ -107,10 +123,11 @@ class _Steps(NamedTuple):
     dt: Array
     sigma: Array
 
-    def ranges(self, width: int) -> tuple[Array, Array]:
-        """Return the least and largest speed in so many steps before and after each frame, (n, m, 2) each.
+    def ranges(self, width: int, first: NDArray[np.int64], last: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return the least and largest speed in so many steps before and after each of these frames.
 
-        They are NaN near the ends of a run, where fewer than `_LEAST` of these steps exist.
+        The shapes are (k, m, 2). The speeds are NaN near the ends of a run, where fewer than `_LEAST` of
+        these steps exist.
         """
         inside = (np.diff(self.run) == 0)[:, None]
         pad, window = ((width, width), (0, 0)), (width, 0)
@@ -118,14 +135,15 @@ class _Steps(NamedTuple):
             np.pad(np.where(inside, self.speed, fill), pad, constant_values=fill)
             for fill in (np.inf, -np.inf)
         )
-        low, high = (
-            sliding_window_view(low, *window).min(axis=-1),
-            sliding_window_view(high, *window).max(axis=-1),
-        )
-        count = sliding_window_view(np.pad(inside, pad), *window).sum(axis=-1)
-        result = np.where(count[..., None] < _LEAST, np.nan, np.stack([low, high], axis=-1))
-        n = len(self.t)
-        return result[:n], result[width : width + n]
+        count = sliding_window_view(np.pad(inside, pad), *window)
+        low, high = sliding_window_view(low, *window), sliding_window_view(high, *window)
+
+        def extremes(at: NDArray[np.int64]) -> Array:
+            result = np.stack([low[at].min(axis=-1), high[at].max(axis=-1)], axis=-1)
+            result[count[at].sum(axis=-1)[:, 0] < _LEAST] = np.nan
+            return result
+
+        return extremes(first), extremes(width + last)
 
     def jumps(self, numbers: NDArray[np.int64], ranges: Array) -> Flags:
         """Return True for each of these steps and each channel if its speed is far outside a range."""
@@ -156,11 +174,15 @@ class _Steps(NamedTuple):
 
 
 class _Block(NamedTuple):
-    """Frames from `start` to before `end`, and which of them are outliers."""
+    """Frames from `start` to before `end`, which of them are outliers, and the speed of the jumps.
+
+    The speed is that of the slower jump at either end in each channel, infinite in channels without a jump.
+    """
 
     start: int
     end: int
     odd: Flags
+    speed: Array
 
 
 def _odd_blocks(t: Array, x: Array, sigma: Array, linked: Flags, odd: Flags) -> Flags:
@@ -171,29 +193,48 @@ def _odd_blocks(t: Array, x: Array, sigma: Array, linked: Flags, odd: Flags) -> 
     a good frame next to an outlier does not belong to it.
     """
     run = np.concatenate([[0], np.cumsum(~linked)])
-    codes, number = odd, 0
+    codes = odd
+    blocks: list[tuple[NDArray[np.int64], Array]] = []
     for _ in range(_CLEANED):
         kept = np.flatnonzero(~odd)
-        blocks = _blocks(t[kept], x[kept], sigma, run[kept])
-        if not blocks:
+        more = _blocks(t[kept], x[kept], sigma, run[kept])
+        if not more:
             break
         odd = odd.copy()
-        for start, end, is_odd in blocks:
-            odd[kept[start:end][is_odd]] = True
-            number += bool((is_odd[1:] & is_odd[:-1]).any())
-    # Jumps that recur are spikes of the motion.
-    return odd if number <= max(_RARE * len(t), _FEW) else codes
+        for block in more:
+            frames = kept[block.start : block.end][block.odd]
+            odd[frames] = True
+            blocks.append((frames, block.speed))
+    # Jumps that recur are spikes of the motion, whether or not the other jumps belong to blocks.
+    number = sum(bool((np.diff(frames) == 1).any()) for frames, _speed in blocks)
+    most = max(_RARE * len(t), _FEW)
+    if number > most or (odd & ~codes).sum() > _MOST * len(t):
+        return codes
+    is_step = linked & ~odd[1:] & ~odd[:-1]
+    steps = np.abs(np.diff(x, axis=0) / _durations(t))[is_step]
+    odd = codes.copy()
+    for frames, speed in blocks:
+        if number + 0.5 * (steps > _AS_FAST * speed).any(axis=1).sum() <= most:
+            odd[frames] = True
+    return codes | (odd & ~_gradual(t, x, odd))
+
+
+def _durations(t: Array) -> Array:
+    """Return the durations of the steps, (n - 1, 1); a short one would exaggerate the noise of the speed."""
+    dt = np.diff(t)
+    result: Array = np.maximum(dt, 0.5 * float(np.median(dt)))[:, None]
+    return result
 
 
 def _blocks(t: Array, x: Array, sigma: Array, run: NDArray[np.int64]) -> list[_Block]:
     """List blocks that do not overlap, the shortest first."""
     if len(t) < 2 * _LEAST + 3:
         return []
-    dt = np.diff(t)
-    dt = np.maximum(dt, 0.5 * float(np.median(dt)))[:, None]
+    dt = _durations(t)
     steps = _Steps(t, x, run, np.diff(x, axis=0) / dt, dt, sigma)
-    before, _after = steps.ranges(_AROUND)
-    starts = np.flatnonzero(steps.jumps(np.arange(len(dt)), before[:-1]).any(axis=1)) + 1
+    numbers = np.arange(len(dt))
+    before, _after = steps.ranges(_AROUND, numbers, numbers)
+    starts = np.flatnonzero(steps.jumps(numbers, before).any(axis=1)) + 1
     taken = np.zeros(len(t), dtype=bool)
     result: list[_Block] = []
     for length in range(1, _LONGEST + 1) if len(starts) else ():
@@ -207,9 +248,7 @@ def _blocks(t: Array, x: Array, sigma: Array, run: NDArray[np.int64]) -> list[_B
 def _blocks_of(steps: _Steps, starts: NDArray[np.int64], length: int) -> Iterator[_Block]:
     """Yield the blocks of so many frames that begin at one of the `starts`."""
     first, last = starts - 1, starts + length
-    before, after = (
-        side[at] for side, at in zip(steps.ranges(max(length, _AROUND)), (first, last), strict=True)
-    )
+    before, after = steps.ranges(max(length, _AROUND), first, last)
     ranges = np.stack(
         [np.minimum(before[..., 0], after[..., 0]), np.maximum(before[..., 1], after[..., 1])], axis=-1
     )
@@ -220,14 +259,37 @@ def _blocks_of(steps: _Steps, starts: NDArray[np.int64], length: int) -> Iterato
     )
     is_odd[steps.run[first] != steps.run[last]] = False
     for k in np.flatnonzero(is_odd.any(axis=1)):
+        channels = is_odd[k]
         # Good frames between two outliers stay.
         inner = np.arange(starts[k], last[k])
         before_inner, after_inner = np.full(length, first[k]), np.full(length, last[k])
         is_reached = steps.bridges(before_inner, inner, ranges[[k]], 0.0)
         is_reached &= steps.bridges(inner, after_inner, ranges[[k]], 0.0)
-        odd: Flags = ~np.all(is_reached[:, is_odd[k]], axis=1)
+        odd: Flags = ~np.all(is_reached[:, channels], axis=1)
         if odd.any():
-            yield _Block(int(starts[k]), int(last[k]), odd)
+            speed = np.abs(steps.speed[[first[k], last[k] - 1]]).min(axis=0)
+            yield _Block(int(starts[k]), int(last[k]), odd, np.where(channels, speed, np.inf))
+
+
+def _gradual(t: Array, x: Array, odd: Flags) -> Flags:
+    """Return True for three or more outliers in a row that go away from the motion and come back gradually.
+
+    Such a spike of the motion begins or ends near it, even if its first step far exceeds the steps before,
+    and it goes up and down once.
+    """
+    result = np.zeros(len(t), dtype=bool)
+    scale = np.ptp(x, axis=0) + np.finfo(np.float64).tiny
+    for frames in np.split(np.arange(len(t)), np.flatnonzero(np.diff(odd)) + 1):
+        if len(frames) < 3 or not odd[frames[0]] or frames[0] == 0 or frames[-1] == len(t) - 1:
+            continue
+        around = np.arange(frames[0] - 1, frames[-1] + 2)
+        line = (t[around] - t[around[0]])[:, None] / (t[around[-1]] - t[around[0]])
+        off = x[around] - x[around[0]] - line * (x[around[-1]] - x[around[0]])
+        off = off[:, np.argmax(np.abs(off).max(axis=0) / scale)]
+        size = np.abs(off)
+        path = np.abs(np.diff(off)).sum()
+        result[frames] = min(size[1], size[-2]) < _ABRUPT * size.max() and path < _ONCE * 2 * np.ptp(off)
+    return result
 
 
 def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags) -> Flags:
@@ -245,6 +307,7 @@ def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags
     for channel in filled.T:
         channel[odd] = between(odd, channel)
     weights, noisier = _cubic(t)
+    rounding = 8 * np.finfo(np.float64).eps * np.abs(guess).max(axis=0)
     dt = np.diff(t)[:, None]
     longest = np.maximum(dt[1:-2], dt[2:-1])
     for _ in range(_CLEANED):
@@ -252,7 +315,10 @@ def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags
         around = (filled[:-4], filled[1:-3], filled[3:-1], filled[4:])
         cubic = sum(w[:, None] * x for w, x in zip(weights, around, strict=True))
         off[2:-2] = np.abs(filled[2:-2] - cubic) / noisier[:, None]
-        typical = np.maximum(np.median(off[inside & ~odd], axis=0), sigma)
+        # An exact rest does not show the noise.
+        clean = off[inside & ~odd]
+        shown = [column[column > least] for column, least in zip(clean.T, rounding, strict=True)]
+        typical = np.maximum([np.median(column) if len(column) else 0.0 for column in shown], sigma)
         # A film may be so precise that the motion's own bends exceed the noise: they are smaller than its
         # steps.
         speed = np.abs(np.diff(filled, axis=0)) / dt
