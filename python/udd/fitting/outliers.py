@@ -18,7 +18,7 @@ Flags = NDArray[np.bool_]
 _ODD = 9.0
 _END, _JUMP = 8, 30.0  # Frames at an end of a run; no motion jumps there by so many of their steps.
 _LEAP = 0.5  # Share of the steps before and after that a bend of the motion does not reach.
-# Distance from the lines through either side below which a motion has a kink: a share of that from the cubic.
+# A kink is this much closer to the lines through its sides than to the cubic, and its sides are as straight.
 _KINK = 0.2
 _CLEANED = 8  # Rounds of outlier detection: outliers close to each other hide each other.
 _LONGEST = 20  # frames of a block
@@ -323,10 +323,13 @@ def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags
         # steps.
         speed = np.abs(np.diff(filled, axis=0)) / dt
         off[2:-2][off[2:-2] < _LEAP * longest * np.maximum(speed[:-3], speed[3:])] = 0.0
-        # A kick or an impact, which a cubic does not follow, lies between the lines through its sides.
+        # A kick or an impact, which a cubic does not follow, lies between the lines through its sides. So may
+        # an outlier, if these sides are curved.
         sides = np.stack([2 * filled[1:-3] - filled[:-4], 2 * filled[3:-1] - filled[4:]])
         beyond = np.maximum(filled[2:-2] - sides.max(axis=0), sides.min(axis=0) - filled[2:-2])
-        off[2:-2][beyond < _KINK * off[2:-2]] = 0.0
+        bend = np.pad(np.abs(np.diff(filled, 2, axis=0)), ((1, 1), (0, 0)), constant_values=np.inf)
+        curvature = np.maximum(bend[:-4], bend[4:])
+        off[2:-2][np.maximum(beyond, curvature) < _KINK * off[2:-2]] = 0.0
         off[~inside | odd] = 0.0
         # Only the worst of adjacent outliers is removed in a round: it distorts the cubics of the others.
         far = (off / typical).max(axis=1)
