@@ -172,8 +172,12 @@ def _in_use(folder: Path) -> int | None:
         import fcntl
 
         place = os.open(folder / "done" / "zarr.json", os.O_RDONLY)  # written once
-        fcntl.flock(place, fcntl.LOCK_SH)
     except (ImportError, OSError):
+        return None
+    try:
+        fcntl.flock(place, fcntl.LOCK_SH)
+    except OSError:
+        os.close(place)
         return None
     return place
 
