@@ -255,19 +255,12 @@ impl Program {
         let mut results = [A::zero()];
         let first = self.states + self.leaves.len() - self.constants;
         let end = first + self.constants + self.first.len();
-        let mut work = |work: &mut [A]| {
+        self.with_registers(|work: &mut [A]| {
             for (register, &value) in work[first..end].iter_mut().zip(&fixed[first..end]) {
                 *register = lift(value);
             }
             self.follow(place, &[A::mask(true); MAX_SURFACES], work, &mut results);
-        };
-        match self.room() {
-            room if room <= ROOMS[0] => work(&mut [A::zero(); ROOMS[0]]),
-            room if room <= ROOMS[1] => work(&mut [A::zero(); ROOMS[1]]),
-            room if room <= ROOMS[2] => work(&mut [A::zero(); ROOMS[2]]),
-            room if room <= ROOMS[3] => work(&mut [A::zero(); ROOMS[3]]),
-            room => work(&mut vec![A::zero(); room]),
-        }
+        });
         results[0]
     }
 
@@ -279,12 +272,19 @@ impl Program {
         sides: &Sides<S>,
         results: &mut [S],
     ) {
-        let mut work = |work: &mut [S]| {
+        self.with_registers(|work: &mut [S]| {
             self.determine(parameter, work);
             self.follow(place, sides, work, results);
-        };
+        });
+    }
+
+    /// Does the work with registers that are zero, without an allocation if they have room.
+    #[inline(always)]
+    fn with_registers<S: Scalar>(&self, work: impl FnOnce(&mut [S])) {
         match self.room() {
+            room if room <= ROOMS[0] => work(&mut [S::zero(); ROOMS[0]]),
             room if room <= ROOMS[1] => work(&mut [S::zero(); ROOMS[1]]),
+            room if room <= ROOMS[2] => work(&mut [S::zero(); ROOMS[2]]),
             room if room <= ROOMS[3] => work(&mut [S::zero(); ROOMS[3]]),
             room => work(&mut vec![S::zero(); room]),
         }
