@@ -11,7 +11,7 @@ mod shooting;
 mod stiffness;
 mod trajectory;
 
-pub use crate::integrate::CancelFlag;
+pub use crate::integrate::{CancelFlag, Stop};
 pub use batch::lanes::{LaneBatch, Start};
 pub use batch::method_factory::{Dop853Factory, Dopri5Factory, MethodFactory, TaylorFactory};
 pub use batch::rows;

@@ -1,6 +1,6 @@
 //! One run, sampled.
 
-use crate::analysis::CancelFlag;
+use crate::analysis::Stop;
 use crate::analysis::batch::step_budget::StepBudget;
 use crate::analysis::stiffness::{Look, Stiffness};
 use crate::integrate::{Counts, Ending, Failure, Integrator, Method, Steps, Tolerance};
@@ -61,7 +61,7 @@ pub fn trajectory<M: System<f64, D>, K: Method<f64, D>, const D: usize>(
     x0: [f64; D],
     tolerance: &Tolerance,
     keep: bool,
-    watched: (&CancelFlag, Option<&Stiffness>),
+    watched: (&dyn Stop, Option<&Stiffness>),
 ) -> Result<Run<D>, Failure> {
     let start = match output {
         Output::At(times) => times.first().copied().unwrap_or(0.0),
@@ -76,7 +76,7 @@ fn sampled<const D: usize>(
     run: &mut dyn Steps<D>,
     output: Output<'_>,
     keep: bool,
-    (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
+    (stop, stiffness): (&dyn Stop, Option<&Stiffness>),
 ) -> Result<Run<D>, Failure> {
     let (start, x0) = (run.t(), *run.x());
     let (times, end, places) = match output {
@@ -148,7 +148,7 @@ const EACH: f64 = f64::NEG_INFINITY;
 pub(in crate::analysis) fn follow<const D: usize>(
     run: &mut dyn Steps<D>,
     end: f64,
-    (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
+    (stop, stiffness): (&dyn Stop, Option<&Stiffness>),
     see: &mut dyn FnMut(&dyn Steps<D>, Ending) -> Result<f64, Failure>,
 ) -> Result<Outcome, Failure> {
     let mut look = Look::new();

@@ -7,7 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Failure;
 
-/// Set by one thread, looked at by the threads that work, at least every few microseconds.
+/// Asked every few microseconds whether the work is to end.
+pub trait Stop: Sync {
+    /// [`Failure::Interrupted`] if so.
+    fn check(&self) -> Result<(), Failure>;
+}
+
+/// Set by one thread, looked at by the threads that work.
 #[derive(Debug, Default)]
 pub struct CancelFlag(AtomicBool);
 
@@ -26,6 +32,12 @@ impl CancelFlag {
     #[inline]
     pub fn check(&self) -> Result<(), Failure> {
         if self.0.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
+    }
+}
+
+impl Stop for CancelFlag {
+    fn check(&self) -> Result<(), Failure> {
+        self.check()
     }
 }
 

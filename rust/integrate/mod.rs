@@ -20,7 +20,7 @@ pub mod tableau;
 mod taylor;
 pub mod zeros;
 
-pub use cancel::CancelFlag;
+pub use cancel::{CancelFlag, Stop};
 pub use dop853::Dop853Scheme;
 pub use integrator::{Counts, Ending, Integrator, Progress};
 pub use method::{Method, Trial};

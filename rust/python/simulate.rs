@@ -1,7 +1,7 @@
 //! `udd.simulate`.
 
-use std::cell::Cell;
 use std::ffi::CString;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -11,7 +11,7 @@ use super::errors::{IntegrationError, ModelError, room_for};
 use super::interrupt;
 use super::jobs;
 use super::model::{AnyModel, state, with_model};
-use crate::analysis::{CancelFlag, MethodChoice, Output, Run, Stiffness, rows, trajectory};
+use crate::analysis::{MethodChoice, Output, Run, Stiffness, Stop, rows, trajectory};
 use crate::integrate::{Dop853, Dopri5, Failure, Rodas, Taylor, Tolerance, order};
 use crate::model::{self, Family, System};
 use crate::observe::Record;
@@ -87,7 +87,7 @@ fn run<F: Family<D>, const D: usize>(
     by: RunMethod,
     (output, x0): (Output<'_>, [f64; D]),
     (tolerance, keep): (&Tolerance, bool),
-    (stop, stiffness): (&CancelFlag, Option<&Stiffness>),
+    (stop, stiffness): (&dyn Stop, Option<&Stiffness>),
 ) -> Result<Flat, PyErr> {
     let system = || family.build(values);
     let (idle, order) = (family.idle(), order(tolerance));
@@ -217,9 +217,9 @@ fn simulate<'py>(
     // The predefined models are not stiff, but stability limits their steps when they stop.
     let watched = model.is_own();
     let stiffness = Stiffness::new(method == "auto");
-    let told = Cell::new(method == "auto");
-    let tell = || match stiffness.recognised() {
-        Some(t) if !told.replace(true) => stiff(py, method, t),
+    let is_warned = AtomicBool::new(method == "auto");
+    let warn = |py: Python<'_>| match stiffness.recognised() {
+        Some(t) if !is_warned.swap(true, Ordering::Relaxed) => stiff(py, method, t),
         _ => Ok(()),
     };
     let times = times.as_ref().map(PyReadonlyArray1::as_slice).transpose()?;
@@ -238,14 +238,14 @@ fn simulate<'py>(
             let message = "the initial state lies outside the disk: Y^2 + Z^2 must be below R^2 (or use edge=\"ignore\")";
             return Err(ModelError::new_err(message));
         }
-        let work = |stop: &CancelFlag| {
+        let work = |stop: &dyn Stop| {
             run(family, values, by, (output, x0), (&tolerance, dense), (stop, watched.then_some(&stiffness)))
         };
-        let (flat, signal) = interrupt::watch(py, &tell, work)?;
+        let (flat, signal) = interrupt::watch_here(py, &warn, work)?;
         signal?;
         flat?
     });
-    tell()?;
+    warn(py)?;
 
     let table = |values: Vec<f64>| PyArray1::from_vec(py, values);
     let rows = flat.t.len();

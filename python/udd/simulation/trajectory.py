@@ -262,7 +262,7 @@ def checked_times(t: ArrayLike) -> NDArray[np.float64] | float:
         raise ModelError(f"t must be a number or a list of times, not of shape {times.shape}")
     if times.ndim == 0:
         return number("t", float(times), least=0.0)
-    if not (np.diff(times) > 0).all():
+    if not (times[1:] > times[:-1]).all():
         raise ModelError("the times must increase, without duplicates")
     return times
 
@@ -410,7 +410,7 @@ def integrated(
     state = initial_state(model, state0)
     rtol, atol = tolerances(rtol, atol)
     times = checked_times(t)
-    longest = longest_step(max_step, times if isinstance(times, float) else float(np.ptp(times)))
+    longest = longest_step(max_step, times if isinstance(times, float) else float(times[-1] - times[0]))
     stepper = method_for(model, method, rtol)
     model = driven(model, np.array([0.0, times]) if isinstance(times, float) else times, inputs)
     if isinstance(times, float):
