@@ -52,7 +52,7 @@ impl Action {
 }
 
 /// The same operations with this many registers. A line has a width, the count of numbers that it takes at once. Elements of
-/// the work from `results` on are not needed afterwards. `None` if a place has several values.
+/// the work from `results` on are not needed afterwards. `None` if a value is needed after its place has another one.
 pub(super) fn allocate(
     lines: &[(usize, Line)],
     registers: usize,
@@ -70,6 +70,8 @@ pub(super) fn allocate(
 fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Action>)> {
     let (mut known, mut actions) = (Vec::<Known>::new(), Vec::with_capacity(lines.len()));
     let mut in_place = HashMap::<(Place, usize), Value>::new();
+    // Values whose places have others from an operation on.
+    let mut replaced = Vec::new();
     let mut in_register = [None; 1 << u8::BITS];
     // `LoadUpper` always reads memory, so these places must be stored.
     let upper = |&(_, line): &(usize, Line)| match line {
@@ -112,8 +114,10 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
                 let stored = if is_part { new(width, &mut known) } else { value };
                 known[stored].home.get_or_insert(place);
                 known[stored].saved |= is_part;
-                if in_place.insert((place, width), stored).is_some() {
-                    return None;
+                if let Some(former) = in_place.insert((place, width), stored)
+                    && former != stored
+                {
+                    replaced.push((former, actions.len()));
                 }
                 if is_part || place.1 < results || read.contains(&place) {
                     actions.push(Action::Store(width, place, value));
@@ -122,8 +126,8 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
             Line::StoreUpper(place, from) => {
                 actions.push(Action::StoreUpper(place, of(from.into(), &mut known)?));
                 known.push(Known { home: Some(place), saved: true, width: 1, ..Known::default() });
-                if in_place.insert((place, 1), known.len() - 1).is_some() {
-                    return None;
+                if let Some(former) = in_place.insert((place, 1), known.len() - 1) {
+                    replaced.push((former, actions.len()));
                 }
             }
             Line::LoadUpper(to, a, place) => {
@@ -152,7 +156,9 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
             known[value].uses.push(i);
         }
     }
-    Some((known, actions))
+    let is_needed =
+        |&(value, from): &(Value, usize)| known[value].uses.first().is_some_and(|&last| last >= from);
+    if replaced.iter().any(is_needed) { None } else { Some((known, actions)) }
 }
 
 /// The registers and what they contain.
@@ -407,11 +413,21 @@ mod tests {
         }
     }
 
-    /// A place that changes is not followed: the list stays as it is.
+    /// A place may change if its former value is not needed any more; otherwise the list stays as it is.
     #[test]
-    fn places_have_one_value() {
-        let (place, register) = (Place(Array::Work, 3), name(0));
-        let lines = [Line::Load(register, place.into()), Line::Store(place, register)].map(|line| (8, line));
-        assert!(allocate(&lines, 16, 9).is_none());
+    fn a_value_is_not_needed_after_its_place_changed() {
+        let (from, place, [a, b]) = (Place(Array::Work, 2), Place(Array::Work, 3), [name(0), name(1)]);
+        let add = |to, other: Place| Line::Apply(Operation::Add, to, to, other.into());
+        let begin =
+            [Line::Load(a, from.into()), add(a, from), Line::Store(place, a), Line::Load(b, place.into())];
+        let change = [add(a, from), Line::Store(place, a)];
+        let use_former = [add(b, from), Line::Store(Place(Array::Work, 5), b)];
+        let allocated = |lines: [&[Line]; 3]| {
+            let lines: Vec<_> = lines.concat().into_iter().map(|line| (8, line)).collect();
+            allocate(&lines, 16, 9).map(|allocated| [lines, allocated].map(|lines| run(&lines, 16, 10)))
+        };
+        let [before, after] = allocated([&begin, &use_former, &change]).unwrap();
+        assert_eq!(before, after);
+        assert!(allocated([&begin, &change, &use_former]).is_none());
     }
 }

@@ -207,7 +207,7 @@ impl Listing {
     }
 
     /// Lets operations find their operands in registers. Elements of the work from `results` on are not needed after a
-    /// function. Returns false if a place has several values.
+    /// function. Returns false if a value is needed after its place has another one.
     #[must_use]
     pub fn allocate(&mut self, results: usize) -> bool {
         let registers = if self.isa == Isa::Avx512 && self.lanes > 1 { 32 } else { 16 };

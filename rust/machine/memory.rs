@@ -63,7 +63,9 @@ impl Code {
         };
         let start = self.starts[function];
         let (work, held): (*mut f64, *const f64) = (work.as_mut_ptr().cast(), held.as_ptr().cast());
-        for from in (0..self.lanes).step_by(self.step) {
+        let mut from = 0;
+        // A range in steps would divide.
+        while from < self.lanes {
             // SAFETY: a whole function of this signature begins here, and the machine has its instructions. A plain
             // number is `lanes` numbers side by side, as is a mask of its size, and the arrays are as long as the
             // function needs, as just checked.
@@ -72,6 +74,7 @@ impl Code {
                 let shifted = |array: *const f64| array.wrapping_add(from);
                 entry(work.wrapping_add(from), shifted(held), shifted(sides), self.constants.as_ptr());
             }
+            from += self.step;
         }
     }
 }

@@ -23,7 +23,7 @@ pub(in crate::tape) fn numbers(program: &Program, room: usize, is_single: bool) 
     let stretches = &program.stretches;
     let chains = stretches.iter().flat_map(|s| &s.chains).filter(|chain| long(chain.first)).count();
     let steps = stretches.iter().filter(|s| s.last.is_some_and(|step| step.factors().is_some())).count();
-    let sums = 2 * room * (chains + steps);
+    let sums = 2 * TOGETHER * (chains + steps);
     if is_single { program.plan.numbers(room) + MOST * sums } else { sums }
 }
 
@@ -128,9 +128,9 @@ impl Series {
         m.is_multiple_of(2) && m / 2 < self.first_of_sums()
     }
 
-    /// The place of a sum that is begun.
+    /// The place of a sum that is begun; the next orders have the same places.
     fn in_advance(&self, product: usize, odd: usize, m: usize) -> Place {
         let each = if self.list.is_single() { MOST } else { 1 };
-        Place(Array::Work, self.ahead + each * ((2 * product + odd) * self.room + m))
+        Place(Array::Work, self.ahead + each * ((2 * product + odd) * TOGETHER + m % TOGETHER))
     }
 }
