@@ -33,6 +33,8 @@ pub struct Taylor<'a, S: Scalar, const D: usize> {
     tape: &'a Tape<D>,
     parameters: Vec<S>,
     jets: Jets<S, D, COEFFICIENTS>,
+    /// The rates of the last trial's polynomial at its end, of a law that steps have to obey.
+    slope: [S::Real; D],
     /// True if what does not change along a solution is evaluated.
     held: bool,
 }
@@ -41,7 +43,8 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     /// For the system with this tape and these parameters, of this [`order`]; the series is computed with these
     /// instructions.
     pub fn new(tape: &'a Tape<D>, parameters: Vec<S>, order: usize, isa: Isa) -> Self {
-        Self { tape, parameters, jets: Jets::new(tape, isa).with_order(order), held: false }
+        let jets = Jets::new(tape, isa).with_order(order);
+        Self { tape, parameters, jets, slope: [S::Real::zero(); D], held: false }
     }
 
     /// Halves steps whose polynomial does not obey the law at their end; fails where none does.
@@ -74,7 +77,7 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
                 return;
             }
             trial.size = S::Real::select(bad, trial.size.scale(0.5), trial.size);
-            trial.x = self.jets.at(trial.size);
+            (trial.x, self.slope) = self.jets.at_with_slope(trial.size);
         }
     }
 
@@ -86,7 +89,7 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
         trial: &Trial<S, D>,
         part: f64,
     ) -> (S::Mask, bool) {
-        let between = (part < 1.0).then(|| self.real_at(trial.size.scale(part), &[true; D]));
+        let between = (part < 1.0).then(|| self.jets.real_with_slope(trial.size.scale(part)));
         let isa = self.jets.isa();
         let strays = Strays { method: self, at, trial, part, between: between.as_ref(), norm };
         // Worth a copy for each instruction set where all lanes and states are side by side.
@@ -98,14 +101,17 @@ impl<'a, S: Scalar, const D: usize> Taylor<'a, S, D> {
     }
 }
 
+/// A state and the polynomial's rates there.
+type StateAndSlope<R, const D: usize> = ([R; D], [R; D]);
+
 /// The comparison of the polynomial's rates with those of the law, at a part of a trial. It is true if they differ by too
-/// much, and the trial's error is a number; the state there is given unless it is the end.
+/// much, and the trial's error is a number; the state and the polynomial's rates there are given unless it is the end.
 struct Strays<'a, 'b, S: Scalar, const D: usize, E> {
     method: &'a mut Taylor<'b, S, D>,
     at: &'a StepStart<S, D>,
     trial: &'a Trial<S, D>,
     part: f64,
-    between: Option<&'a [S::Real; D]>,
+    between: Option<&'a StateAndSlope<S::Real, D>>,
     norm: &'a E,
 }
 
@@ -116,17 +122,14 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Strays<'_, '_, S, D
     fn run<V: InstructionSet>(self) -> (S::Mask, bool) {
         let Self { method, at, trial, part, between, norm } = self;
         let &Trial { size, error, .. } = trial;
-        let dt = size.scale(part);
-        let x = match between {
-            Some(x) => *x,
-            None => vector!(S::Real, D; n => trial.x[n].real()),
+        let (x, slope) = match between {
+            Some(&between) => between,
+            None => (vector!(S::Real, D; n => trial.x[n].real()), method.slope),
         };
-        let rates = method.jets.rates(method.tape, at.t + dt, &x, &at.sides);
-        let slope = method.jets.slope_here(dt);
+        let rates = method.jets.rates(method.tape, at.t + size.scale(part), &x, &at.sides);
         let defect = vector!(S::Real, D; n => (slope[n] - rates[n]) * size);
         let from = vector!(S::Real, D; n => at.x[n].real());
-        let defect = norm.state().norm(defect, from, x);
-        let bad = error.finite().and(defect.less(S::Real::constant(MOST_DEFECT)).not());
+        let bad = error.finite().and(norm.state().exceeds(MOST_DEFECT, defect, from, x));
         (bad, bad.any())
     }
 }
@@ -224,19 +227,20 @@ impl<S: Scalar, const D: usize, E: ErrorNorm<S, D>> Work for Attempt<'_, '_, S, 
         let weights = norm.weights(&at.x);
         let jets = &mut method.jets;
         jets.expand_here::<V>(method.tape, S::lift(at.t), &at.x, &at.sides);
+        let slope = (!method.tape.is_unrolled()).then_some(&mut method.slope);
         if const { V::ISA.is_rare() || size_of::<S>() > 2 * size_of::<S::Real>() } {
-            return followed(jets, jets.order(), h, norm, &weights);
+            return followed(jets, jets.order(), h, norm, &weights, slope);
         }
         // The usual orders known to the compiler: not where tangents make every operation long.
         match jets.order() {
-            LOW => followed(jets, LOW, h, norm, &weights),
-            HIGH => followed(jets, HIGH, h, norm, &weights),
-            order => followed(jets, order, h, norm, &weights),
+            LOW => followed(jets, LOW, h, norm, &weights, slope),
+            HIGH => followed(jets, HIGH, h, norm, &weights, slope),
+            order => followed(jets, order, h, norm, &weights, slope),
         }
     }
 }
 
-/// The solution as far as its series up to this order goes, at most to `h`.
+/// The solution as far as its series up to this order goes, at most to `h`, and the polynomial's rates there if they are needed.
 #[inline(always)]
 fn followed<S: Scalar, const D: usize, E: ErrorNorm<S, D>>(
     jets: &Jets<S, D, COEFFICIENTS>,
@@ -244,11 +248,22 @@ fn followed<S: Scalar, const D: usize, E: ErrorNorm<S, D>>(
     h: S::Real,
     norm: &E,
     weights: &E::Weights,
+    slope: Option<&mut [S::Real; D]>,
 ) -> Trial<S, D> {
     let radius = jets.radius(order, norm, weights);
     let short = radius.less(h.abs());
     let size = S::Real::select(short, radius.zip(h, f64::copysign), h);
     let known = S::Real::zero().less(radius);
     let error = S::Real::select(known, S::Real::zero(), S::Real::constant(f64::NAN));
-    Trial { x: jets.at_here(order, size), size, error }
+    let x = match slope {
+        Some(slope) => {
+            let x;
+            (x, *slope) = jets.at_with_slope_here(order, size);
+            x
+        }
+        // Only models of three and four states have series that are written out.
+        None if const { D == 3 || D == 4 } => jets.at_here(order, size),
+        None => unreachable!("the law of a series that is not written out is compared"),
+    };
+    Trial { x, size, error }
 }

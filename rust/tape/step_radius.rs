@@ -2,7 +2,7 @@
 
 use std::convert::identity;
 
-use super::{HIGH, Jets, LOW};
+use super::Jets;
 use crate::scalar::elementary::power_rough;
 use crate::scalar::{InstructionSet, Mask, Packet, Real, Scalar, Work, vector};
 use crate::tolerance::ErrorNorm;
@@ -22,22 +22,14 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
         S::Real::work(self.isa(), Along::<S, D, N, P>(self, dt, parts, of))
     }
 
-    /// The rates of the polynomial at a distance `dt`, without derivatives, with the caller's instructions.
-    #[inline(always)]
-    pub fn slope_here(&self, dt: S::Real) -> [S::Real; D] {
-        // As in a step, the usual orders are known to the compiler.
-        match self.order() {
-            order if const { !S::IS_PLAIN } => self.slope_of(order, dt),
-            LOW => self.slope_of(LOW, dt),
-            HIGH => self.slope_of(HIGH, dt),
-            order => self.slope_of(order, dt),
-        }
+    /// The solution at a distance `dt` and the rates of its polynomial there, without their derivatives.
+    pub fn at_with_slope(&self, dt: S::Real) -> ([S; D], [S::Real; D]) {
+        S::Real::work(self.isa(), WithSlope(self, dt))
     }
 
-    #[inline(always)]
-    fn slope_of(&self, order: usize, dt: S::Real) -> [S::Real; D] {
-        let series = self.coefficients();
-        vector!(S::Real, D; n => value::<true, _, _>(&series[n][1..=order.min(N - 1)], dt, S::real))
+    /// The same of the state without derivatives.
+    pub fn real_with_slope(&self, dt: S::Real) -> ([S::Real; D], [S::Real; D]) {
+        S::Real::work(self.isa(), RealWithSlope(self, dt))
     }
 
     /// As [`at`](Jets::at), with the caller's instructions, by the series up to this order.
@@ -45,14 +37,29 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     pub fn at_here(&self, order: usize, dt: S::Real) -> [S; D] {
         let (series, terms) = (self.coefficients(), order.min(N - 1) + 1);
         if const { size_of::<S>() == size_of::<S::Real>() } {
-            return vector!(S, D; n => value::<false, _, _>(&series[n][..terms], dt, identity));
+            return vector!(S, D; n => value(&series[n][..terms], dt, identity));
         }
         // Derivatives fill the registers: one component after the other.
         let mut x = [S::zero(); D];
         for n in 0..D {
-            x[n] = value::<false, _, _>(&series[n][..terms], dt, identity);
+            x[n] = value(&series[n][..terms], dt, identity);
         }
         x
+    }
+
+    /// As [`at_with_slope`](Jets::at_with_slope), with the caller's instructions, by the series up to this order.
+    #[inline(always)]
+    pub fn at_with_slope_here(&self, order: usize, dt: S::Real) -> ([S; D], [S::Real; D]) {
+        let (series, terms) = (self.coefficients(), order.min(N - 1) + 1);
+        let (mut x, mut slope) = ([S::zero(); D], [S::Real::zero(); D]);
+        if const { size_of::<S>() == size_of::<S::Real>() } {
+            unroll!(n in 0..D => { (x[n], slope[n]) = with_slope(&series[n][..terms], dt, identity); });
+        } else {
+            for n in 0..D {
+                (x[n], slope[n]) = with_slope(&series[n][..terms], dt, identity);
+            }
+        }
+        (x, slope)
     }
 
     /// The coefficients of a component up to the order.
@@ -68,12 +75,12 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
             let mut x = [S::Real::zero(); D];
             for n in 0..D {
                 if of[n] {
-                    x[n] = value::<false, _, _>(self.terms(n), dt, S::real);
+                    x[n] = value(self.terms(n), dt, S::real);
                 }
             }
             return x;
         }
-        vector!(S::Real, D; n => if of[n] { value::<false, _, _>(self.terms(n), dt, S::real) } else { S::Real::zero() })
+        vector!(S::Real, D; n => if of[n] { value(self.terms(n), dt, S::real) } else { S::Real::zero() })
     }
 
     /// How far the solution may be followed by the series up to this order: the last two terms are then as small
@@ -129,27 +136,25 @@ impl<S: Scalar, const D: usize, const N: usize> Jets<S, D, N> {
     }
 }
 
-/// The weights of a series' coefficients from order 1 on in the series of its derivative.
-const WEIGHTS: [f64; 24] = {
-    let mut weights = [0.0; 24];
-    let mut k = 0;
-    while k < 24 {
-        weights[k] = (k + 1) as f64;
-        k += 1;
-    }
-    weights
-};
-
-/// A coefficient, or its weight times it.
+/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type, and does no more:
+/// the compiler need not inline it.
 #[inline(always)]
-fn weighted<const WEIGHTED: bool, T: Scalar>(k: usize, c: T) -> T {
-    if const { WEIGHTED } { c.scale(WEIGHTS[k]) } else { c }
+fn value<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -> T {
+    evaluate::<false, _, _>(series, dt, lift).0
 }
 
-/// A component's value at `dt`, from its coefficients; `lift` turns them into numbers of the value's type, and does no more:
-/// the compiler need not inline it. The series of the derivative has weights.
+/// The same and the derivative with respect to `dt`.
 #[inline(always)]
-fn value<const WEIGHTED: bool, S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -> T {
+fn with_slope<S: Copy, T: Scalar>(series: &[S], dt: T::Real, lift: impl Fn(S) -> T) -> (T, T::Real) {
+    evaluate::<true, _, _>(series, dt, lift)
+}
+
+#[inline(always)]
+fn evaluate<const SLOPE: bool, S: Copy, T: Scalar>(
+    series: &[S],
+    dt: T::Real,
+    lift: impl Fn(S) -> T,
+) -> (T, T::Real) {
     let dt2 = dt * dt;
     let dt4 = dt2 * dt2;
     // Four polynomials in dt^4 side by side, of the orders 1, 5, ..., 2, 6, ... and so on.
@@ -160,18 +165,32 @@ fn value<const WEIGHTED: bool, S: Copy, T: Scalar>(series: &[S], dt: T::Real, li
         (groups, highest) = (lower, last);
     }
     let mut sums = [T::zero(); 4];
-    let places = 1 + 4 * groups.len();
-    for (r, (sum, &c)) in sums.iter_mut().zip(highest).enumerate() {
-        *sum = weighted::<WEIGHTED, T>(places + r, lift(c));
+    for (sum, &c) in sums.iter_mut().zip(highest) {
+        *sum = lift(c);
     }
-    for (i, group) in groups.iter().enumerate().rev() {
+    // Their derivatives with respect to dt^4.
+    let mut slopes = [T::Real::zero(); 4];
+    for group in groups.iter().rev() {
         for r in 0..4 {
-            sums[r] = weighted::<WEIGHTED, T>(1 + 4 * i + r, lift(group[r])).fused_times(sums[r], dt4);
+            if const { SLOPE } {
+                slopes[r] = sums[r].real().fused(slopes[r], dt4);
+            }
+            sums[r] = lift(group[r]).fused_times(sums[r], dt4);
         }
     }
     // The state itself is added last, which rounds once.
     let (low, high) = (sums[0].fused_times(sums[1], dt), sums[2].fused_times(sums[3], dt));
-    weighted::<WEIGHTED, T>(0, lift(series[0])).fused_times(low.fused_times(high, dt2), dt)
+    let value = lift(series[0]).fused_times(low.fused_times(high, dt2), dt);
+    if const { !SLOPE } {
+        return (value, T::Real::zero());
+    }
+    // The derivative of dt^(r + 1) S(dt^4) is dt^r ((r + 1) S + 4 dt^4 S').
+    let outer = dt4.scale(4.0);
+    let mut parts = [T::Real::zero(); 4];
+    for r in 0..4 {
+        parts[r] = sums[r].real().scale((r + 1) as f64).fused(slopes[r], outer);
+    }
+    (value, parts[0].fused(parts[1], dt).fused(parts[2].fused(parts[3], dt), dt2))
 }
 
 /// The number without derivatives, in every lane.
@@ -188,6 +207,33 @@ impl<S: Scalar, const D: usize, const N: usize> Work for Value<'_, S, D, N> {
     #[inline(always)]
     fn run<V: InstructionSet>(self) -> [S; D] {
         self.0.at_here(self.0.order(), self.1)
+    }
+}
+
+struct WithSlope<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
+
+impl<S: Scalar, const D: usize, const N: usize> Work for WithSlope<'_, S, D, N> {
+    type Output = ([S; D], [S::Real; D]);
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> Self::Output {
+        self.0.at_with_slope_here(self.0.order(), self.1)
+    }
+}
+
+struct RealWithSlope<'a, S: Scalar, const D: usize, const N: usize>(&'a Jets<S, D, N>, S::Real);
+
+impl<S: Scalar, const D: usize, const N: usize> Work for RealWithSlope<'_, S, D, N> {
+    type Output = ([S::Real; D], [S::Real; D]);
+
+    #[inline(always)]
+    fn run<V: InstructionSet>(self) -> Self::Output {
+        let Self(jets, dt) = self;
+        let (mut x, mut slope) = ([S::Real::zero(); D], [S::Real::zero(); D]);
+        for n in 0..D {
+            (x[n], slope[n]) = with_slope(jets.terms(n), dt, S::real);
+        }
+        (x, slope)
     }
 }
 
@@ -211,7 +257,7 @@ impl<S: Scalar, const D: usize, const N: usize, const P: usize> Work for Along<'
             let places: Packet<P, V> = Packet::from_lanes(|i| dt.lane(0) * part(i));
             unroll!(n in 0..D => {
                 if of[n] {
-                    let found = value::<false, _, _>(jets.terms(n), places, broadcast::<S, P, V>);
+                    let found = value(jets.terms(n), places, broadcast::<S, P, V>);
                     for i in 0..P {
                         states[i][n] = S::Real::constant(found.lane(i));
                     }
