@@ -1,12 +1,15 @@
-"""The models for tables with an input: a disk with a measured drive, a pendulum with a measured torque."""
+"""Models that only the page makes: a disk with a measured drive, a driven and a double pendulum."""
 
 from __future__ import annotations
 
+from typing import Any
+
 from udd.measurement import Measurement
-from udd.models import Disk, Model, Pendulum
+from udd.models import Disk, Model, Pendulum, mechanism
 from udd.models.driven import driven_disk
 from udd.models.formula_model import FormulaModel
 
+DOUBLE = ("th1", "th2")  # angles of a double pendulum
 #: The input's name in a disk's record, and in that of a pendulum.
 DRIVE, TORQUE = "W", "u"
 
@@ -20,6 +23,12 @@ CONSTANTS = {
     "g": ("gravity", "m/s²"),
     "bias": ("zero of the gyroscope", "rad/s"),
     "theta0": ("zero of the angle", "rad"),
+    "l1": ("length of the upper pendulum", "m"),
+    "l2": ("length of the lower pendulum", "m"),
+    "m": ("mass of the lower bob by that of the upper one", ""),
+    "b1": ("friction of the upper joint, per mass of the upper bob", "m²/s"),
+    "b2": ("friction of the lower joint, per mass of the upper bob", "m²/s"),
+    "tilt": ("tilt of the camera", "rad"),
     "gain": ("angular acceleration per unit of the input", ""),
 }
 
@@ -52,4 +61,30 @@ def driven_model(measurement: Measurement, length: float | None, R: float) -> Mo
         angles=["theta"],
         inputs=[TORQUE],
         observe={seen: f"{seen} + {zero}"},
+    )
+
+
+def double_pendulum(measurement: Measurement) -> Model:
+    """Return the model of two bobs on light rods; the first lengths are those of the film.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        ``th1, th2``, and in ``meta`` the upper length [m] and both lengths [pixels].
+    """
+    meta = measurement.meta
+    upper: Any = meta["length"]
+    ratio: Any = meta["lower_length_px"] / meta["length_px"]
+    coupling = "m*l1*l2*cos(th1 - th2)"
+    joint = "b2*(w2 - w1)"
+    return mechanism(
+        {"th1": "w1", "th2": "w2"},
+        [["(1 + m)*l1^2", coupling], [coupling, "m*l2^2"]],
+        [
+            f"-(1 + m)*9.81*l1*sin(th1) - m*l1*l2*sin(th1 - th2)*w2^2 - b1*w1 + {joint}",
+            f"-m*9.81*l2*sin(th2) + m*l1*l2*sin(th1 - th2)*w1^2 - {joint}",
+        ],
+        {"l1": upper, "l2": ratio * upper, "m": 1.0, "b1": 0.0, "b2": 0.0, "tilt": 0.0},
+        angles=DOUBLE,
+        observe={name: f"{name} + tilt" for name in DOUBLE},
     )

@@ -211,8 +211,8 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
         file = await uploads.receive(request.stream(), folder)
         chosen = parsed("the columns", request.query_params.get("columns") or "[]")
         film = file.suffix == ".film"
-        if film and (bob := request.query_params.get("bob")):
-            given["bob"] = _bob(bob, given)
+        if film:
+            given["options"] = _track_options(request, given)
         return {"kind": "loop", "file": file.name, "film": film, "columns": chosen, **given}
     if kind == "sample":
         from udd.demo import pipeline
@@ -223,6 +223,7 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
             "kind": "loop",
             "file": "sample.mp4",
             "film": True,
+            "options": {"disk_radius": pipeline.R},
             "W": pipeline.W,
             "R": pipeline.R,
             "origin": pipeline.ORIGIN,
@@ -238,14 +239,19 @@ async def _asked(kind: str, request: Request, folder: Path) -> dict[str, Any]:
     raise UddError("There is no such job.")
 
 
-def _bob(colour: str, given: Mapping[str, Any]) -> str:
-    """Check the colour of a pendulum's bob, whose length must be given."""
-    from udd.markers.layout import read_bob
+def _track_options(request: Request, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of `udd.track` that come with a film: entries of a config file, and the fields."""
+    from udd.tracking.calibration.config import read_options
 
-    read_bob(colour)
-    if not given.get("length"):
+    options: dict[str, Any] = parsed("the layout file", request.query_params.get("config", ""), toml=True)
+    if "R" in given:
+        options["disk_radius"] = given["R"]
+    if bob := request.query_params.get("bob"):
+        options |= {"bob": bob, "length": given.get("length")}
+    checked = read_options(options)
+    if checked.bob is not None and checked.length is None:
         raise UddError("A pendulum's film needs the length, in m, from the pivot to the bob.")
-    return colour
+    return options
 
 
 def _number(request: Request, name: str) -> float | None:

@@ -91,20 +91,19 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     from udd.measurement.time_span import between
     from udd.models import Disk, Model, Pendulum
 
+    from .driven_models import DOUBLE, double_pendulum, driven_model
     from .table_columns import measurement_of
 
     file = Path(asked["file"])
-    film, bob = asked["film"], asked.get("bob")
-    of_device = () if bob else ("W", "R", "origin")
+    film, is_pendulum = asked["film"], "bob" in asked.get("options", {})
+    of_device = () if is_pendulum else ("W", "R", "origin")
     constants = {k: asked[k] for k in of_device if asked.get(k) is not None}
     tell({"say": "reading the film" if film else "reading the table"})
     if film:
         _check(file)
-        if bob is None and "W" not in constants:
+        if not is_pendulum and "W" not in constants:
             raise UddError(_NO_DRIVE)
-        options = {"bob": bob, "length": asked["length"]} if bob else {"disk_radius": 0.08}
-        options |= {"disk_radius": constants["R"]} if "R" in constants else {}
-        measurement = _tracked(file, {**options, **(asked.get("hints") or {})}, tell).with_meta(**constants)
+        measurement = _tracked(file, asked["options"], tell, asked.get("hints")).with_meta(**constants)
     else:
         measurement = measurement_of(file, asked.get("columns") or [], constants)
         measurement = between(measurement, asked.get("begin"), asked.get("end"))
@@ -115,9 +114,9 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
     if swings and not length:
         raise UddError("this is a pendulum's record: say its length in cm")
     if measurement.inputs:
-        from .driven_models import driven_model
-
         model: Model = driven_model(measurement, float(length) if swings else None, float(R))
+    elif measurement.names == DOUBLE:
+        model = double_pendulum(measurement)
     elif swings:
         pendulum = Pendulum(float(length))
         model = pendulum if measurement.kind == "pendulum" else pendulum.with_gyroscope()
@@ -149,8 +148,10 @@ def _check(file: Path) -> None:
         raise TrackError(f"the film is cut off: {missing} of its {film.promised} frames are missing")
 
 
-def _tracked(file: Path, options: dict[str, Any], tell: Tell) -> Measurement:
-    """Track a film, and show it meanwhile; a refused film leaves frames to click on."""
+def _tracked(
+    file: Path, options: dict[str, Any], tell: Tell, hints: dict[str, Any] | None = None
+) -> Measurement:
+    """Track a film, and show it meanwhile; a refused film leaves frames to click on, which give hints."""
     import cv2
 
     from udd.tracking import TrackedFrame, TrackError
@@ -189,20 +190,19 @@ def _tracked(file: Path, options: dict[str, Any], tell: Tell) -> Measurement:
             tell({"say": "refining the positions"})
 
     try:
-        done = run_tracker(file, watch=watch, config=options, progress=stage)
+        done = run_tracker(file, watch=watch, config={**options, **(hints or {})}, progress=stage)
         return done.measurement if isinstance(done, Tracking) else done
     except UddError:
-        _leave_frames(file, options)
+        _leave_frames(file, {**options, **(hints or {})}, options)
         raise
 
 
-def _leave_frames(file: Path, options: dict[str, Any]) -> None:
+def _leave_frames(file: Path, options: dict[str, Any], without_clicks: dict[str, Any]) -> None:
     """Write frames to click on, and the clicks so far."""
     from udd.report.refused_film import click_data, look
 
-    bob = {"bob": options["bob"]} if "bob" in options else {}
     # clicks that cannot be used are no reason to show nothing
-    refused = look(file, options) or look(file, bob)
+    refused = look(file, options) or look(file, without_clicks)
     if refused is not None:
         (OUT / REFUSED).write_text(as_json(click_data(refused)), encoding="utf-8")
 

@@ -325,8 +325,7 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         options["region"] = numbers([args.region], "--region")
     if args.calibrate is not None:
         options["calibrate"] = _calibrate(args.calibrate)
-    options |= {"bob": None if args.bob is None else _bob(args.bob), "length": args.length}
-    options |= {"leave_out": args.leave_out, "clicks": args.clicks}
+    options |= {name: getattr(args, name) for name in ("bob", "length", "leave_out", "clicks")}
     return {**options, "refine": False if args.fast else None, "config": args.config}
 
 
@@ -341,22 +340,6 @@ def _rates(said: str | None) -> Any:
             raise UddError(f"--fps must be like 240, or 30,61:240,301:30 (from frame 61 on 240), not {said}")
         rates.append((int(numbers([first], "--fps")[0]) if colon else 0, numbers([rate], "--fps")[0]))
     return rates if len(rates) > 1 else rates[0][1]
-
-
-def _bob(said: str) -> Any:
-    """Read a colour's name, codes like 150,105,65, or the names of two colours like red,blue."""
-    from udd.markers.layout import NAMED, PALE
-
-    names = said.split(",")
-    if len(names) <= 2 and all(name in NAMED | PALE for name in names):
-        return names if len(names) == 2 else said
-    try:
-        return [int(code) for code in said.split(",", 2)]
-    except ValueError:
-        colours = ", ".join(NAMED | PALE)
-        raise UddError(
-            f"--bob must be one of {colours}, two of them (red,blue), or codes like 150,105,65, not {said}"
-        ) from None
 
 
 def _calibrate(said: str) -> dict[str, Any]:

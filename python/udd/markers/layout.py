@@ -141,18 +141,33 @@ def read_bob(said: Any) -> Layout:
     Parameters
     ----------
     said : str, sequence of three int, or sequence of two such
-        Names of `NAMED` or `PALE`, or sRGB codes.
+        Names of `NAMED` or `PALE`, or sRGB codes; or a text of one or two, such as ``red,150,105,65``.
 
     Raises
     ------
     TrackError
-        No such name, or codes outside of 0 to 255.
+        No such name, codes outside of 0 to 255, or more than two colours.
     """
-    two = isinstance(said, Sequence) and not isinstance(said, str) and len(said) == 2
-    colours = tuple(_colour(each, "bob", NAMED | PALE) for each in (said if two else (said,)))
-    if two and colours[0] == colours[1]:
-        raise TrackError(f"bob: two bobs need two colours, not {said[0]!r} twice")
+    if isinstance(said, str):
+        bobs = _colours_in(said)
+    else:
+        bobs = said if isinstance(said, Sequence) and len(said) == 2 else [said]
+    colours = tuple(_colour(each, "bob", NAMED | PALE) for each in bobs)
+    if len(colours) > 2:
+        raise TrackError(f"bob must be one colour, or those of the upper and the lower bob, not {said!r}")
+    if len(set(colours)) < len(colours):
+        raise TrackError(f"bob: two bobs need two colours, not {bobs[0]!r} twice")
     return Layout(tuple(complex(k + 1) for k in range(len(colours))), colours)
+
+
+def _colours_in(text: str) -> list[Any]:
+    """Return the colours in a text: names and codes, three for each colour."""
+    parts, colours = text.split(","), list[Any]()
+    while parts:
+        is_code = parts[0].strip()[:1].isdigit()
+        colours.append(parts[:3] if is_code else parts[0])
+        parts = parts[3 if is_code else 1 :]
+    return colours
 
 
 def _check(layout: Layout) -> None:

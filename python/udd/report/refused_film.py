@@ -40,7 +40,13 @@ TRY_BOB = (
     "If something else of the bob's colour moves, click the region in which the bob moves.",
     "If the bob does not swing from a fixed pivot, the film shows no pendulum, and udd cannot track it.",
 )
+TRY_TAGS = (
+    "Click below what you know of the film, and track it again with the command that is shown then.",
+    "Each tag needs its white margin, and must be sharp: take more light or a shorter exposure.",
+    "Compare the layout with the disk: the dictionary and the number of each tag, and its place and side.",
+)
 DISK_TOOLS = ("pivot", "points", "marks", "edge", "region")
+TAG_TOOLS = ("pivot", "points", "region")
 BOB_TOOLS = ("bob", "pivot", "region")
 
 
@@ -116,12 +122,13 @@ def write_refused(
     before, command = commands or (None, shlex.join(["udd", "track", str(video)]))
     data = {**click_data(refused), "command": command}
     safe = json.dumps(data).replace("<", "\\u003c")  # a film's name may hold an HTML tag
-    advice = TRY if refused.options.bob is None else TRY_BOB
+    options = refused.options
+    advice = TRY_TAGS if options.tags else TRY if options.bob is None else TRY_BOB
     sections = [
         Section("Why not", (Paragraph(f"{reason}.", "warn"), *(Paragraph(text) for text in advice))),
         Section("Click what you know", (Clickable(Markup(safe)),)),
     ]
-    if not refused.options.tags:
+    if not options.tags:
         shown = (_counted(refused), Gallery(_frames(refused)))
         sections.append(Section("Patches in the colours of the marks", shown))
     sections.append(Section("The film", (_facts(refused),)))
@@ -141,8 +148,8 @@ def click_data(refused: RefusedFilm) -> dict[str, Any]:
     calm.sort(key=lambda picture: (picture.index - first) % refused.look_over.frames)  # from the calmest on
     return {
         "size": [refused.look_over.width, refused.look_over.height],
-        "pendulum": options.bob is not None,
-        "tools": DISK_TOOLS if options.bob is None else BOB_TOOLS,
+        "bobs": 0 if options.bob is None else len(options.layout.places),
+        "tools": TAG_TOOLS if options.tags else DISK_TOOLS if options.bob is None else BOB_TOOLS,
         "frames": [
             {
                 "index": picture.index,

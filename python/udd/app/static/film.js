@@ -28,8 +28,11 @@ export class Loop {
     for (const name of ["W", "R", "length"]) $(`loop-${name}`).addEventListener("input", () => this.tell());
     for (const name of ["wheel", "rpm"]) $(`loop-${name}`).addEventListener("input", () => this.fromWheel());
     this.columns = new Columns(() => this.tell());
-    $("loop-bob").append(...list("loop_bobs").map(([value, text]) => new Option(text, value)));
-    $("loop-bob").addEventListener("change", () => this.tell());
+    const colours = list("loop_bobs");
+    const bobs = colours.map(([value, colour]) => new Option(t("loop_pendulum", { colour }), value));
+    $("loop-bob").append(new Option(t("loop_disk"), ""), ...bobs);
+    $("loop-lower").append(new Option(t("loop_no_lower"), ""), ...colours.map(([value, colour]) => new Option(colour, value)));
+    for (const id of ["loop-bob", "loop-lower"]) $(id).addEventListener("change", () => this.tell());
     $("file").addEventListener("change", () => this.choose($("file").files[0]));
     $("go").addEventListener("click", () => this.send());
     $("track-again").addEventListener("click", () => this.again());
@@ -105,9 +108,9 @@ export class Loop {
     return this.file?.type.startsWith("video/") || FILMS.test(this.file?.name ?? "");
   }
 
-  /** The colour of the bob if the film shows a pendulum. */
+  /** The colour of the bob if the film shows a pendulum; of both bobs if it is a double one. */
   get bob() {
-    return this.isFilm ? $("loop-bob").value : "";
+    return this.isFilm ? ["loop-bob", "loop-lower"].map((id) => $(id).value).filter(Boolean).join() : "";
   }
 
   get tooLarge() {
@@ -155,7 +158,10 @@ export class Loop {
 
   /** Say beside the button what is missing. */
   tell() {
-    const { why } = this;
+    const { why } = this, disk = !$("loop-bob").value;
+    $("loop-layout").parentElement.hidden = !disk;
+    $("loop-lower").parentElement.hidden = disk;
+    if (disk) $("loop-lower").value = "";
     $("why").textContent = why || this.doubt;
     $("go").classList.toggle("waiting", why !== "");
   }
@@ -175,6 +181,7 @@ export class Loop {
     }
     const chosen = this.isFilm || !this.table ? [] : this.columns.chosen;
     if (this.bob) values.bob = this.bob;
+    else if (this.isFilm && $("loop-layout").files[0]) values.config = await $("loop-layout").files[0].text();
     if (chosen.length) values.columns = JSON.stringify(chosen);
     await this.begin("film", values, this.file);
   }

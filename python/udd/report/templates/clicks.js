@@ -16,6 +16,7 @@ export const WORDS = {
   hint_edge: "Click three places on the edge, far from each other; or, once, the centre.",
   hint_region: "Click two opposite corners of the part in which it moves.",
   hint_bob: "Click the middle of the bob.",
+  hint_bob_two: "Click the middle of the upper bob, then of the lower one.",
   frame: "Frame {index}, {t} s",
   before: "Frame before",
   after: "Frame after",
@@ -30,6 +31,7 @@ export const WORDS = {
   copied: "Copied",
   nothing: "Nothing is clicked yet.",
   need_points: "Click two points and give their distance.",
+  need_bob: "Click the lower bob too, in the same frame.",
   need_region: "Click the other corner of the region.",
   need_edge: "Marks need the edge: click three places on it, or the centre.",
   need_marks: "Click two marks or more: the edge alone is of no use.",
@@ -37,8 +39,9 @@ export const WORDS = {
   need_leave_out: "Frames to leave out must be like 3,10-20.",
 };
 const COLOURS = { pivot: "#00e5ff", points: "#ffd400", marks: "#ff4df0", edge: "#7dff5a", region: "#ff9f1c", bob: "#ff4df0" };
-const MOST = { pivot: 1, points: 2, region: 2, bob: 1 };
-const ON_DISK = ["points", "marks", "edge"]; // these move, so that they belong to one frame
+const MOST = { pivot: 1, points: 2, region: 2 };
+const ON_DISK = ["points", "marks", "edge"];
+const MOVING = [...ON_DISK, "bob"]; // these belong to one frame
 const LOUPE = 24; // pixels of the film to each side
 
 const pair = ([u, v], mark) => [u, v].map((x) => +x.toFixed(1)).join(mark);
@@ -46,7 +49,7 @@ const pair = ([u, v], mark) => [u, v].map((x) => +x.toFixed(1)).join(mark);
 /** Clicks on the frames of `data`, shown in `box`; `changed` is called after each change. */
 export class Clicks {
   constructor(box, data, words = WORDS, changed = () => {}) {
-    Object.assign(this, { box, data, words, changed, at: 0, tool: data.tools[0], history: [] });
+    Object.assign(this, { box, data, words, changed, at: 0, tool: data.tools[0], history: [], most: { ...MOST, bob: data.bobs } });
     const start = data.start ?? {};
     this.places = Object.fromEntries(Object.keys(COLOURS).map((name) => [name, start[name] ?? []]));
     this.frame = start.frame ?? null;
@@ -114,7 +117,8 @@ export class Clicks {
 
   /** The word for a tool; some have another one in the film of a pendulum. */
   word(name) {
-    return (this.data.pendulum && this.words[`${name}_swing`]) || this.words[name];
+    const { bobs } = this.data, { words } = this;
+    return (bobs > 1 && words[`${name}_two`]) || (bobs && words[`${name}_swing`]) || words[name];
   }
 
   /** Show the frame with this number in the list. */
@@ -153,8 +157,8 @@ export class Clicks {
   remember() {
     const { index } = this.data.frames[this.at];
     this.history.push(JSON.stringify([this.places, this.frame, this.colour]));
-    if (!ON_DISK.includes(this.tool)) return;
-    if (this.frame !== index) for (const name of ON_DISK) this.places[name] = [];
+    if (!MOVING.includes(this.tool)) return;
+    if (this.frame !== index) for (const name of MOVING) this.places[name] = [];
     this.frame = index;
   }
 
@@ -167,7 +171,8 @@ export class Clicks {
     } catch {} // the pointer is gone already
     this.remember();
     const list = this.places[this.tool];
-    if (list.length >= (MOST[this.tool] ?? 64)) list.length = this.tool === "region" || this.tool === "points" ? 0 : list.length - 1;
+    const most = this.most[this.tool] ?? 64;
+    if (list.length >= most) list.length = most === 2 ? 0 : most - 1;
     list.push(this.place(e));
     this.held = true;
     this.tell();
@@ -221,22 +226,24 @@ export class Clicks {
       const [first, last] = part.split("-");
       return part.trim() && index >= +first && index <= +(last ?? first);
     });
-    if (this.places.bob.length && !this.held) this.sample();
+    if (this.places.bob.length && this.frame === index && !this.held) this.sample();
     this.draw();
     const { problem, empty } = this;
     this.note.textContent = problem || (empty ? this.words.nothing : "");
     this.changed(this);
   }
 
-  /** The colour of the bob: the median of 5 x 5 pixels. */
+  /** The colours of the bobs: medians of 5 x 5 pixels. */
   sample() {
-    const [u, v] = this.places.bob[0], bare = document.createElement("canvas");
+    const bare = document.createElement("canvas");
     bare.width = this.canvas.width;
     bare.height = this.canvas.height;
     const c = bare.getContext("2d");
     c.drawImage(this.image, 0, 0);
-    const { data } = c.getImageData(Math.round(u * this.zoom) - 2, Math.round(v * this.zoom) - 2, 5, 5);
-    this.colour = [0, 1, 2].map((k) => Array.from({ length: 25 }, (_, n) => data[4 * n + k]).sort((a, b) => a - b)[12]);
+    this.colour = this.places.bob.map(([u, v]) => {
+      const { data } = c.getImageData(Math.round(u * this.zoom) - 2, Math.round(v * this.zoom) - 2, 5, 5);
+      return [0, 1, 2].map((k) => Array.from({ length: 25 }, (_, n) => data[4 * n + k]).sort((a, b) => a - b)[12]);
+    });
   }
 
   get rates() {
@@ -257,6 +264,7 @@ export class Clicks {
   get problem() {
     const { places: p, words: w } = this, metres = this.distance ? +this.distance.value.replace(",", ".") : 0;
     if (this.distance && (p.points.length || this.distance.value.trim()) && !(p.points.length === 2 && metres > 0)) return w.need_points;
+    if (p.bob.length && p.bob.length < this.data.bobs) return w.need_bob;
     if (p.region.length === 1) return w.need_region;
     if (p.marks.length && ![1, 3].includes(Math.min(p.edge.length, 3))) return w.need_edge;
     if (p.edge.length && p.marks.length < 2) return w.need_marks;
@@ -270,7 +278,7 @@ export class Clicks {
   get value() {
     const { places: p, rates, stretches } = this, round = ([u, v]) => [+u.toFixed(1), +v.toFixed(1)], out = {};
     const clicks = {};
-    if (p.pivot.length && this.data.pendulum) out.pivot = round(p.pivot[0]);
+    if (p.pivot.length && this.data.bobs) out.pivot = round(p.pivot[0]);
     else if (p.pivot.length) clicks.pivot = round(p.pivot[0]);
     for (const name of ON_DISK) if (p[name].length) clicks[name] = p[name].map(round);
     if (p.points.length) clicks.distance = +this.distance.value.replace(",", ".");
@@ -281,7 +289,7 @@ export class Clicks {
     }
     if (rates.length) out.fps = rates.length > 1 ? rates : rates[0][1];
     if (stretches.length) out.leave_out = stretches.map((part) => [part[0], part.at(-1)]);
-    if (this.colour) out.bob = this.colour;
+    if (this.colour) out.bob = this.colour.join();
     return out;
   }
 
@@ -298,7 +306,7 @@ export class Clicks {
       words.push("--clicks", parts.join(","));
     }
     if (value.pivot) words.push("--pivot", value.pivot.join(","));
-    if (value.bob) words.push("--bob", value.bob.join(","));
+    if (value.bob) words.push("--bob", value.bob);
     if (value.region) words.push("--region", value.region.join(","));
     if (value.fps) words.push("--fps", Array.isArray(value.fps) ? value.fps.map(([k, rate], n) => (n ? `${k}:${rate}` : rate)).join(",") : value.fps);
     if (value.leave_out) words.push("--leave-out", value.leave_out.map(([a, b]) => (a === b ? a : `${a}-${b}`)).join(","));
@@ -321,7 +329,7 @@ export class Clicks {
       }
     };
     for (const [name, list] of Object.entries(this.places)) {
-      if (ON_DISK.includes(name) && this.frame !== frame.index) continue;
+      if (MOVING.includes(name) && this.frame !== frame.index) continue;
       const dots = list.map(at), size = 9 * fine;
       if (name === "region" && dots.length === 2) stroke(COLOURS.region, () => c.rect(...dots[0], dots[1][0] - dots[0][0], dots[1][1] - dots[0][1]));
       if (name === "points" && dots.length === 2) stroke(COLOURS.points, () => dots.forEach((dot, k) => c[k ? "lineTo" : "moveTo"](...dot)));

@@ -71,7 +71,7 @@ def _given(options: TrackOptions) -> dict[str, Any]:
         if getattr(options, name) != FIELDS[name].default
     }
     if not options.layout.standard:
-        out["layout"] = options.layout
+        out["layout"] = options.tags or options.layout
     switches = {name: value for name, value in asdict(options.calibrate).items() if value is not True}
     errors = {name: value for name, value in asdict(options.sigma).items() if value}
     return {**out, "calibrate": switches, "sigma": errors}
