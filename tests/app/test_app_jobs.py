@@ -178,10 +178,13 @@ def test_a_pendulums_film_is_tracked(client: TestClient, tmp_path: Path) -> None
     other = sent(client, film.read_bytes(), bob="blue", length="0.25")
     assert other["answer"]["error"].startswith("No bob of that colour moves in this film")
     data = client.get(f"/api/jobs/{other['job']}/{jobs.REFUSED}").json()
-    assert data["pendulum"] and data["tools"] == ["bob", "pivot", "region"]
+    assert data["bobs"] == 1 and data["tools"] == ["bob", "pivot", "region"]
     for params, words in (
         ({"bob": "red"}, "needs the length"),
         ({"bob": "pink", "length": "0.3"}, "Bob must be"),
+        ({"bob": "red,red", "length": "0.3"}, "two bobs need two colours"),
+        ({"config": "radius = 0.1"}, "a config has no 'radius'"),
+        ({"config": "no table"}, "is not TOML"),
     ):
         answer = client.post("/api/jobs/film", content=film.read_bytes(), params=params)
         assert answer.status_code == 400 and words in answer.text
@@ -191,7 +194,7 @@ def test_each_language_lists_the_colours_of_bobs() -> None:
     for file in sorted(files("udd.app").joinpath("static").iterdir(), key=str):
         if file.name.startswith("texts.") and file.name.endswith(".json"):
             rows = json.loads(file.read_text(encoding="utf-8"))["loop_bobs"]
-            assert [value for value, _ in rows] == ["", *NAMED, *PALE], file.name
+            assert [value for value, _ in rows] == [*NAMED, *PALE], file.name
 
 
 def test_an_upload_is_no_larger_than_fits(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

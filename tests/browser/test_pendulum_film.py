@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ pytest.importorskip("axe_playwright_python", reason="the browser's tests are not
 
 from axe_playwright_python.sync_playwright import Axe
 
+import udd
 from bob_films import arc, swing
 from browser_for_tests import Opened, until
 from film_for_tests import FPS, HEIGHT, WIDTH, write
@@ -54,6 +56,43 @@ def test_a_pendulum_is_tracked_and_fitted(opened: Opened, film: Path, tmp_path: 
     page.screenshot(path=tmp_path / "fitted.png", full_page=True)
 
 
+def test_two_bobs_are_tracked(opened: Opened, tmp_path: Path) -> None:
+    t = np.arange(60) / FPS
+    upper = arc(0.5 * np.cos(5.0 * t), 125.0)
+    lower = arc(0.7 * np.cos(5.0 * t) + 0.3 * np.sin(11.0 * t), 105.0, upper)
+    bobs = [(*upper, (190, 35, 40)), (*lower, (30, 78, 186))]
+    page = opened.go()
+    page.click("#to-film")
+    page.set_input_files("#file", write(tmp_path / "double.mp4", swing(bobs, (140, 145, 140))))
+    assert page.locator("#loop-lower").is_hidden()
+    page.select_option("#loop-bob", "red")
+    assert page.locator("#loop-layout").is_hidden()
+    page.select_option("#loop-lower", "green")
+    page.fill("#loop-length", "30")
+    page.click("#go")
+    page.wait_for_selector("#refused:not([hidden])")
+    page.check("#refused input[value=bob]")
+    frame = int(page.locator("#refused .clicks output").text_content().split()[1].rstrip(","))
+    click_bob(page, upper[0][frame], upper[1][frame])
+    assert page.locator("#refused .clicks-note").text_content().startswith("Click the lower bob too")
+    click_bob(page, lower[0][frame], lower[1][frame])
+    page.click("#track-again")
+    page.wait_for_selector("#kept:not([hidden])", timeout=120_000)  # too short to be fitted
+    with page.expect_download() as download:
+        page.click("#kept a")
+    m = udd.read_measurement(download.value.path(), states=("th1", "th2"))
+    assert m.seen.mean() > 0.95
+
+
+def click_bob(page: Any, u: float, v: float) -> None:
+    """Click on a place of the frame of a refused film, in pixels."""
+    page.locator("#refused canvas").evaluate("canvas => canvas.scrollIntoView({ block: 'center' })")
+    box = page.locator("#refused canvas").bounding_box()
+    page.mouse.click(
+        box["x"] + (u + 0.5) / WIDTH * box["width"], box["y"] + (v + 0.5) / HEIGHT * box["height"]
+    )
+
+
 def test_a_click_shows_the_bob(opened: Opened, film: Path) -> None:
     page = opened.go()
     page.click("#to-film")
@@ -67,11 +106,7 @@ def test_a_click_shows_the_bob(opened: Opened, film: Path) -> None:
     page.check("#refused input[value=bob]")
     frame = int(page.locator("#refused .clicks output").text_content().split()[1].rstrip(","))
     u, v = (float(x[0]) for x in arc(angle(np.array([frame / FPS])), 900 * LENGTH))
-    page.locator("#refused canvas").evaluate("canvas => canvas.scrollIntoView({ block: 'center' })")
-    box = page.locator("#refused canvas").bounding_box()
-    page.mouse.click(
-        box["x"] + (u + 0.5) / WIDTH * box["width"], box["y"] + (v + 0.5) / HEIGHT * box["height"]
-    )
+    click_bob(page, u, v)
     page.click("#track-again")
     until(page, "document.getElementById('frame-said').textContent.startsWith('frame')", 60)
     page.click("#cancel")

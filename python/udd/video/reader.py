@@ -149,6 +149,7 @@ class Film:
         self._idle = decoder
         self.promised = int(said["frames"])  # 0 where the container does not say
         self.packets = int(said["packets"])  # coded frames that the file holds
+        #: Width and height [pixels]: of the upright pictures as soon as one is read, until then as coded.
         self.size = (int(said["width"]), int(said["height"]))
         self.clock_note = ""  # where times come from, if not from the header alone
         self.forced = rates  # what the header says about time is not believed then
@@ -252,6 +253,8 @@ class Film:
             if "error" in said:
                 raise TrackError(f"{self.path} {said['error']}")
             for picture in decoder.pictures():
+                height, width = picture.y.shape
+                self.size = (width, height)
                 if self.forced is not None:
                     picture = replace(picture, t=time_of(picture.index, self.forced))
                 elif self.clock is not None:
