@@ -304,7 +304,7 @@ def test_the_window_hands_on_what_is_pressed(made: Made, frames: list[Picture]) 
     for z in marks:
         person.click(complex(z))
     person.click(complex(marks[0]))
-    assert shown.told.get_text() == "That mark is clicked already."
+    assert shown.remark_text.get_text() == "That mark is clicked already."
     assert [t.get_text() for t in shown.list.texts][2:8:2] == ["mark 1", "mark 2", "mark 3"]
     person.key("enter")
     for turn in (1, 1j, -1):

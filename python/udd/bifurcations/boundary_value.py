@@ -13,7 +13,7 @@ from udd.errors import ModelError
 from .equilibrium_curve import expansion
 from .flow_map import Floats, FlowMap
 from .pseudo_arclength import CorrectorFailed, natural_constraint, newton_corrector
-from .solution_curve import HELD
+from .solution_curve import NO_PARAMETER
 
 __all__ = ["ConnectingCurve"]
 
@@ -60,7 +60,7 @@ class ConnectingCurve:
     values : ndarray
         The model's parameters, of which the two `free` ones are unknowns.
     free : (int, int)
-        Their indices; the second one is `HELD` if one parameter alone is varied.
+        Their indices; the second one is `NO_PARAMETER` if one parameter alone is varied.
     scales : ndarray, shape (2,)
         The units of both in the unknowns.
     mirror : ndarray, shape (r,)
@@ -118,7 +118,7 @@ class ConnectingCurve:
         if decaying[0] != decaying[1]:
             raise ModelError("an orbit between these equilibria is not isolated in one parameter")
         scales, planes = np.array([abs(value) or 1.0, 1.0]), (np.zeros((0, flow.dim)),) * 2
-        free = parameter, HELD
+        free = parameter, NO_PARAMETER
         curve = cls(flow, values, free, scales, mirror, span, len(rests), decaying, planes, nothing, nothing)
         u = curve.pack(nodes, rests, values)
         return curve.anchored(u), u
@@ -127,7 +127,8 @@ class ConnectingCurve:
         """Unknowns from nodes (m + 1, r), equilibria and all parameters."""
         size, weight = self.flow.size, self.weight
         last = [
-            values[k] / scale if k != HELD else 0.0 for k, scale in zip(self.free, self.scales, strict=True)
+            values[k] / scale if k != NO_PARAMETER else 0.0
+            for k, scale in zip(self.free, self.scales, strict=True)
         ]
         return np.concatenate([(nodes / size * weight).ravel(), (rests / size).ravel(), last])
 
@@ -152,7 +153,7 @@ class ConnectingCurve:
         """Return all parameters."""
         values = self.values.copy()
         for index, value in zip(self.free, self.parameters(u).tolist(), strict=True):
-            if index != HELD:
+            if index != NO_PARAMETER:
                 values[index] = value
         return values
 
@@ -194,7 +195,7 @@ class ConnectingCurve:
         flow, size, r, k = self.flow, self.flow.size, self.flow.dim, self.ends
         nodes, rests, values = self.nodes(u), self.rests(u), self.values_at(u)
         m, weight, x = len(nodes) - 1, self.weight, nodes / size
-        wanted = tuple(index for index in self.free if index != HELD)
+        wanted = tuple(index for index in self.free if index != NO_PARAMETER)
         runs = flow.fly(values, nodes[:-1], np.full(m, self.span / m), wanted, self.loose)
         n, few = (m + 1) * r, k * r + 2
         # The last rows depend on three nodes alone: the first, the middle and the last.

@@ -22,7 +22,7 @@ from .equilibrium_curve import EquilibriumCurve
 from .flow_map import Floats
 from .pseudo_arclength import CorrectorFailed, CurvePoint, guess_at, natural_constraint, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
-from .solution_curve import HELD
+from .solution_curve import NO_PARAMETER
 from .solutions import Equilibrium, PeriodicOrbit, as_plain
 
 if TYPE_CHECKING:
@@ -330,7 +330,7 @@ def cycles_of(branch: Branch) -> list[tuple[PeriodicOrbitCurve, Floats]]:
         raise ModelError("a branch of cycles is needed, of udd.continuation")
     cycles = [(curve, place.u) for curve, place in branch._places if curve.kind == "cycle"]
     curve = cycles[0][0]
-    if curve.parameter == HELD:
+    if curve.parameter == NO_PARAMETER:
         raise ModelError(
             "a branch over a parameter of a model is needed: follow the cycles over a parameter of the "
             f"model, not over {branch.parameter}"

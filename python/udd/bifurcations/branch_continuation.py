@@ -23,7 +23,7 @@ from .flow_map import Floats, flow_of
 from .forced_orbits import require_period
 from .pseudo_arclength import CorrectorFailed, CurvePoint, natural_constraint, newton_corrector, tangent_at
 from .shooting_curve import PeriodicOrbitCurve
-from .solution_curve import HELD
+from .solution_curve import NO_PARAMETER
 from .solutions import Equilibrium, PeriodicOrbit
 
 __all__ = ["bounds_of", "branch_from", "continuation", "in_unit_of", "unit_of"]
@@ -238,7 +238,7 @@ def _through_cycle(
     if forcing is not None:
         require_period(given.model, forcing, given.kept, given.size, parameter)
     flow, nodes, span = replace(old.flow, model=given.model), old.nodes(v), old.span(v)
-    index = HELD if family else flow.index(parameter)
+    index = NO_PARAMETER if family else flow.index(parameter)
     quantity = Conserved.of(flow, parameter) if family and parameter != PERIOD else None
     value = 0.0 if family else float(flow.values[index])
     value = value if quantity is None else quantity.at(flow, nodes[0])[0]

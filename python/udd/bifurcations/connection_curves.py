@@ -20,7 +20,7 @@ from .pseudo_arclength import (
     predictor_corrector_step,
     tangent_at,
 )
-from .solution_curve import HELD
+from .solution_curve import NO_PARAMETER
 
 __all__ = ["ConnectionWay"]
 
@@ -114,7 +114,7 @@ class ConnectionWay:
 
         def over(k: int) -> Connection:
             scales = np.array([curve.scales[k], 1.0])
-            return found_by(*curve.over((curve.free[k], HELD), u, scales), self.parameters[k])
+            return found_by(*curve.over((curve.free[k], NO_PARAMETER), u, scales), self.parameters[k])
 
         try:
             return over(0)

@@ -32,7 +32,7 @@ __all__ = ["Connections", "connections"]
 _ASIDE = 1e-3  # Distance from equilibria, in typical sizes, at which runs begin that show the extent.
 _SHOWN = 20.0  # Typical times that show the extent of the motion.
 _BEND = 3.0  # Typical sizes beyond which distances count less and less.
-_APART = 0.6  # Distance up to which curves are alike.
+_ALIKE = 0.6  # Distance up to which curves are alike.
 _NEAR = 1.0  # Largest distance of a passage.
 _CLOSE = 3e-2  # Distance of a passage from which Newton's method starts.
 _TRIED = 1e-6  # Width of an interval from which it starts as well: slow spirals come nearer slowly.
@@ -237,7 +237,7 @@ class _Scan:
         flow = self.flow
         many = min(len(a.path), len(b.path))
         one, other = (_bent(c.path[:many] - c.rest, flow) for c in (a, b))
-        apart = np.flatnonzero(np.linalg.norm(one - other, axis=1) > _APART)
+        apart = np.flatnonzero(np.linalg.norm(one - other, axis=1) > _ALIKE)
         left = max(a.left_at, b.left_at)
         if not len(apart) or not left < apart[0]:
             return None

@@ -217,9 +217,9 @@ def _doubling_ahead(point: BifurcationPoint, ahead: float, amplitude: float) -> 
     def at(square: float, near: Floats) -> Floats:
         """Return the orbit at the square of an amplitude, from another one."""
         before = float(row @ (near - base))
-        bent = near - base - before * row
+        across = near - base - before * row
         # The part across the amplitude grows with its square.
-        guess = base + square**0.5 * row + bent * (square / before**2 if before else 0.0)
+        guess = base + square**0.5 * row + across * (square / before**2 if before else 0.0)
         try:
             place = corrected_point(new, guess, row)
         except IntegrationError as error:

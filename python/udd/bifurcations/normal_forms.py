@@ -93,7 +93,7 @@ def second_lyapunov_coefficient(at: Callable[[Floats], Derivatives], x: Floats, 
         return float("nan")
     w, q, p = vectors
     a, b, c, eye = here.by_state, here.b, here.c, np.eye(len(x))
-    first, bent = np.zeros_like(here.third, dtype=complex), np.zeros_like(here.third)
+    first, second = np.zeros_like(here.third, dtype=complex), np.zeros_like(here.third)
     for part, unit in ((q.real, 1.0), (q.imag, 1j)):
         reach = float(np.abs(part / size).max())
         if reach == 0.0:
@@ -101,7 +101,7 @@ def second_lyapunov_coefficient(at: Callable[[Floats], Derivatives], x: Floats, 
         h = _STEP / reach
         one, two, minus, far = (at(x + k * h * part).third for k in (1.0, 2.0, -1.0, -2.0))
         first += unit * (8.0 * (one - minus) - (two - far)) / (12.0 * h)
-        bent += (16.0 * (one + minus) - (two + far) - 30.0 * here.third) / (12.0 * h * h)
+        second += (16.0 * (one + minus) - (two + far) - 30.0 * here.third) / (12.0 * h * h)
     qc = q.conj()
 
     def d(u: Any, v: Any, z: Any, conjugate: bool = False) -> Any:
@@ -126,7 +126,7 @@ def second_lyapunov_coefficient(at: Callable[[Floats], Derivatives], x: Floats, 
         d(q, qc, qc) + 4.0 * c(q, qc, h11) + c(qc, qc, h20) + c(q, q, h20.conj()) + 2.0 * b(h11, h11)
         + 2.0 * b(q, h21.conj()) + 2.0 * b(qc, h21) + b(h20.conj(), h20) - 4.0 * h11 * (c1 + c1.conj()),
     )  # fmt: skip
-    fifth = np.einsum("nijk,i,j,k->n", bent, q, q, qc)
+    fifth = np.einsum("nijk,i,j,k->n", second, q, q, qc)
     terms = (
         fifth + d(q, q, h20.conj()) + 3.0 * d(q, qc, h20, True) + 6.0 * d(q, q, h11, True)
         + c(qc, qc, h30) + 3.0 * c(q, q, h21.conj()) + 6.0 * c(q, qc, h21) + 3.0 * c(q, h20.conj(), h20)
@@ -149,8 +149,8 @@ def cusp_coefficient(at: Derivatives) -> float:
     p = p / (p @ q)
     quadratic = at.b(q, q)
     bordered = np.block([[at.by_state, p[:, None]], [q[None], np.zeros((1, 1))]])
-    bent = np.linalg.solve(bordered, np.append(-quadratic + (p @ quadratic) * q, 0.0))[:-1]
-    return float(p @ (at.c(q, q, q) + 3.0 * at.b(q, bent))) / 6.0
+    second_order = np.linalg.solve(bordered, np.append(-quadratic + (p @ quadratic) * q, 0.0))[:-1]
+    return float(p @ (at.c(q, q, q) + 3.0 * at.b(q, second_order))) / 6.0
 
 
 def bogdanov_takens_coefficients(at: Derivatives) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from .forced_orbits import forcing_of, repeats
 from .model_states import state_of_attractor
 from .pseudo_arclength import CorrectorFailed, natural_constraint, nearest_of_family, newton_corrector
 from .shooting_curve import PeriodicOrbitCurve
-from .solution_curve import HELD
+from .solution_curve import NO_PARAMETER
 from .solutions import PeriodicOrbit
 
 if TYPE_CHECKING:
@@ -188,8 +188,8 @@ def closed(
 ) -> tuple[PeriodicOrbitCurve, Floats]:
     """Close the orbit: return the curve with its parameters, and the unknowns there."""
     # The parameter is fixed: any that does not vanish will do; a model may have none.
-    fixed = int(np.argmax(flow.values != 0.0)) if flow.values.size else HELD
-    value = 0.0 if fixed == HELD else float(flow.values[fixed])
+    fixed = int(np.argmax(flow.values != 0.0)) if flow.values.size else NO_PARAMETER
+    value = 0.0 if fixed == NO_PARAMETER else float(flow.values[fixed])
     scale = abs(value) or 1.0
     share = 1.0 if flow.forcing is None else span / flow.forcing.period(flow.values)[0]
     curve = PeriodicOrbitCurve(

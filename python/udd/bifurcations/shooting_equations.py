@@ -11,7 +11,7 @@ import numpy as np
 from .condensation import CyclicEquations
 from .flow_map import Floats, SegmentEnds
 from .pseudo_arclength import CurvePoint, tangent_at
-from .solution_curve import HELD, SolutionCurve
+from .solution_curve import NO_PARAMETER, SolutionCurve
 
 __all__ = ["ShootingEquations"]
 
@@ -153,7 +153,7 @@ class ShootingEquations(SolutionCurve):
         key = u.tobytes()
         if key not in self._last:
             spans = np.full(self.pieces, self.span(u) / self.pieces)
-            wanted = tuple(index for index in (self.parameter, self.second) if index != HELD)
+            wanted = tuple(index for index in (self.parameter, self.second) if index != NO_PARAMETER)
             ends = self.flow.fly(self.values_at(u), self.nodes(u), spans, wanted, self.loose, self.begins(u))
             self._last.clear()
             self._last[key] = ends
@@ -187,7 +187,7 @@ class ShootingEquations(SolutionCurve):
             by_span = by_span + moved * turn / size * (np.arange(m)[:, None] * self.clock / m)
             period, by_values = forcing.period(self.values_at(u))
             phase, along = (self.span(u) - self.share * period) / self.clock, np.zeros((m, r))
-            by_own = 0.0 if self.parameter == HELD else float(by_values[self.parameter])
+            by_own = 0.0 if self.parameter == NO_PARAMETER else float(by_values[self.parameter])
             last = np.array([1.0, -self.share * by_own * self.scale / self.clock])
         residual = np.append(gaps.ravel(), phase)
         by_pair = np.stack([by_span, by_value], axis=2)

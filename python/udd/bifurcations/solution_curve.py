@@ -21,9 +21,9 @@ from .pseudo_arclength import (
     zero_between,
 )
 
-__all__ = ["HELD", "SolutionCurve"]
+__all__ = ["NO_PARAMETER", "SolutionCurve"]
 
-HELD = -1
+NO_PARAMETER = -1
 """The index of a parameter that the model does not have: a cycle alone needs none."""
 
 
@@ -35,11 +35,11 @@ class SolutionCurve:
     ----------
     flow : FlowMap
     values : ndarray
-        The model's parameters; the one with the index `parameter` is varied (`HELD` for none).
+        The model's parameters; the one with the index `parameter` is varied (`NO_PARAMETER` for none).
     scale : float
         The unit of the parameter in the unknowns.
     second : int
-        The index of another parameter by which derivatives are wanted, `HELD` for none.
+        The index of another parameter by which derivatives are wanted, `NO_PARAMETER` for none.
     """
 
     family: ClassVar[bool] = False  # True for cycles that no parameter of the model singles out
@@ -48,7 +48,7 @@ class SolutionCurve:
     values: Floats
     parameter: int
     scale: float
-    second: int = field(default=HELD, kw_only=True)
+    second: int = field(default=NO_PARAMETER, kw_only=True)
 
     @property
     def name(self) -> str:
@@ -62,7 +62,7 @@ class SolutionCurve:
     def values_at(self, u: Floats) -> Floats:
         """Return all parameters."""
         values = self.values.copy()
-        if self.parameter != HELD:
+        if self.parameter != NO_PARAMETER:
             values[self.parameter] = self.value(u)
         return values
 

@@ -111,8 +111,8 @@ class Search:
             accepted.append(addition[0])
             states.append(addition[1])
             self._backward_elimination(accepted, states, rounds)
-            bent, states[-1] = states[-1], self._released(states[-1])
-            if states[-1] is not bent and accepted[-1].chosen.trial.is_curve:
+            before_release, states[-1] = states[-1], self._released(states[-1])
+            if states[-1] is not before_release and accepted[-1].chosen.trial.is_curve:
                 # Fixed parameters biased the curve and hid its formula; relocate it with all parameters free.
                 self._relocated(len(accepted) - 1, accepted, states, rounds)
             # An effect may replace another and be replaced by it again: then the search is circular.

@@ -48,7 +48,7 @@ class Scene:
         self.front, self.clear = _split(front)
         self.shade = _shadow(self.radius)
         self._still = over(front, self.below)
-        self.bent = source_of_pixels(camera, defects) if defects.bends else None
+        self.source_pixels = source_of_pixels(camera, defects) if defects.bends else None
         self.plain = not (defects.bends or defects.lights or defects.moves or len(defects.hands))
         self._codes = to_code(self._still)
         self._picture = np.empty_like(self._codes)
@@ -105,9 +105,9 @@ class Scene:
 
         if len(self.defects.hands):
             light = hand(light, self.camera, time, self.defects)
-        if self.bent is not None:
+        if self.source_pixels is not None:
             light = np.asarray(
-                cv2.remap(light, *self.bent, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),
+                cv2.remap(light, *self.source_pixels, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),
                 dtype=np.float32,
             )
         if self.defects.moves:

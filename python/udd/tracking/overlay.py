@@ -15,7 +15,7 @@ from udd.tracking.metric.pixels_to_metres import Pixels, pixels
 from udd.video.reader import Film
 from udd.video.rgb_frames import rgb
 
-FOUND, CONTACT, SAID = (0, 220, 220), (255, 0, 200), (255, 230, 0)
+FITTED, CONTACT, SAID = (0, 220, 220), (255, 0, 200), (255, 230, 0)
 FINE = 4  # bits of sub-pixel coordinates
 SLOWEST, LIKELY = 1.0, 25.0  # frames/s: what containers take; where the film does not say
 
@@ -91,7 +91,7 @@ def draw(image: NDArray[np.uint8], where: Pixels, k: int, flag: str) -> None:
     u, v = points(where.pivot)
     cv2.drawMarker(image, (int(u) >> FINE, int(v) >> FINE), CONTACT, cv2.MARKER_CROSS, 14, 1)
     if np.isfinite(where.angle[k]):
-        cv2.polylines(image, [points(where.rim[k])], True, FOUND, 1, cv2.LINE_AA, FINE)
+        cv2.polylines(image, [points(where.rim[k])], True, FITTED, 1, cv2.LINE_AA, FINE)
         for mark, colour in zip(where.marks[k], where.colours, strict=True):
             x, y = points(mark)
             for radius, paint in ((6, (255, 255, 255)), (4, colour)):

@@ -23,7 +23,7 @@ STEP = 0.1  # of the exposure's logarithm in one of them: the first estimate may
 SMALL = 0.02  # relative change over which slopes are taken
 WORSE = 5.0  # times the least misfit
 PARABOLA = 0.2  # of the step between shares, to which its vertex is good
-APART = 6.0  # pixels between frames below which a frame says nothing about the exposure
+LEAST_PATH = 6.0  # pixels between frames below which a frame says nothing about the exposure
 STREAK = 2.5  # pixels: shorter streaks look like the lens's blur
 
 
@@ -40,7 +40,7 @@ def exposure(moving: Sequence[Moving], look: DiskAppearance, view: NDArray[np.bo
     reach = look.reach
     paths = [abs(m.rate) * m.interval + abs(m.turning) * m.interval * reach for m in moving]
     order = np.argsort(-np.array(paths), kind="stable")[:FASTEST]
-    fast = [moving[k] for k in order if paths[k] > APART]
+    fast = [moving[k] for k in order if paths[k] > LEAST_PATH]
     if not fast:
         return Exposure(0.0, np.inf)
     costs = []

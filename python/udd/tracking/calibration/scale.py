@@ -15,7 +15,7 @@ from .rim import Rim
 
 REACH = 65 / 80  # of the radius: where the marks of the standard disk have their centres
 RIM_EDGE = 0.35  # pixels: how well light and lens let one say where a bright disk ends
-APART = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
+DISAGREES = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
 MINOR = 0.1  # share of what is said below which the film alone is named
 PLACED = 0.02  # pixels: how well the marks' mean places are known
 BY_HAND = 0.05e-3  # m: how well two marks are glued where the layout says; three and more show it themselves
@@ -45,7 +45,7 @@ def scale(places: NDArray[np.complex128], rim: Rim | None, options: TrackOptions
     film = _from_film(places, rim, options)
     if said is None or film is None:
         return film or said or _by_marks(places, options)  # one is there
-    if abs(film.value - said.value) < APART * np.hypot(film.sigma, said.sigma):
+    if abs(film.value - said.value) < DISAGREES * np.hypot(film.sigma, said.sigma):
         return _combined(film, said)
     warnings.warn(
         f"the film shows {film.value:.1f} pixels per metre (by its {film.origin}), not the {said.value:.1f} "

@@ -44,8 +44,8 @@ class Lens:
     @property
     def row(self) -> tuple[float, ...]:
         """Return the eight numbers: middle u, v, size, curve, tilts, aspect, shear."""
-        bent = (self.size, self.curve, self.tilt_u, self.tilt_v, self.aspect, self.shear)
-        return (self.middle.real, self.middle.imag, *bent)
+        terms = (self.size, self.curve, self.tilt_u, self.tilt_v, self.aspect, self.shear)
+        return (self.middle.real, self.middle.imag, *terms)
 
     @np.errstate(invalid="ignore")  # NaN: where the disk was not seen
     def plane(self, picture: Complexes | complex) -> Complexes:
@@ -91,7 +91,7 @@ class Lens:
 
 
 @dataclass(frozen=True)
-class Bent:
+class LensFit:
     """A lens and how well it is known: standard errors of curve, tilt u, tilt v, aspect and shear."""
 
     lens: Lens
@@ -115,7 +115,7 @@ def calibrate(
     body: Complexes = SQUARE,
     curve: float | None = None,
     tilt: float | None = None,
-) -> Bent:
+) -> LensFit:
     """Find the map under which the marks keep their distances, if one is clearly better than none.
 
     Parameters
@@ -136,7 +136,7 @@ def calibrate(
     as_given = Lens(middle, size, *(float(v) for v in fixed)) if fixed.any() else PLAIN
     free = np.array([curve is None, *[tilt is None] * 4])
     if len(points) < FEWEST or len(body) < 3 or not free.any():
-        return Bent(as_given, np.where(free, np.inf, 0.0), False)
+        return LensFit(as_given, np.where(free, np.inf, 0.0), False)
     first, seen = _layout(points, body), np.isfinite(points)
     n = len(body)
 
@@ -147,29 +147,29 @@ def calibrate(
 
     start = np.concatenate([np.zeros(5), first.real, first.imag])
     flat = least_squares(lambda x: rest(x, False), start, loss="soft_l1", f_scale=0.1)
-    bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
+    fit = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
     spare = max(int(2 * seen.sum() - 3 * len(points)) - 2 * n - 5, 1)
-    spread = _spread(bent, spare)
+    spread = _spread(fit, spare)
     sigma = np.where(free, np.sqrt(np.diag(spread)), 0.0)
     # a disk that hardly moves does not show the lens; what it shows, as a wobble, would become one
     undetermined = sigma > DETERMINED * PRIOR
     if undetermined.any():
         free = free & ~undetermined
-        bent = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
+        fit = least_squares(lambda x: rest(x, True), flat.x, loss="soft_l1", f_scale=0.1)
         # the terms at 0 have the errors of their prior, and displace the others
         carried = spread[:, undetermined] @ np.linalg.pinv(spread[np.ix_(undetermined, undetermined)])
-        variance = np.diag(_spread(bent, spare)) + carried**2 @ PRIOR[undetermined] ** 2
+        variance = np.diag(_spread(fit, spare)) + carried**2 @ PRIOR[undetermined] ** 2
         sigma = np.where(free, np.sqrt(variance), sigma)
-    if bent.cost > BETTER**2 * flat.cost:
-        return Bent(as_given, sigma, False)
-    return Bent(Lens(middle, size, *(float(v) for v in np.where(free, bent.x[:5], fixed))), sigma, True)
+    if fit.cost > BETTER**2 * flat.cost:
+        return LensFit(as_given, sigma, False)
+    return LensFit(Lens(middle, size, *(float(v) for v in np.where(free, fit.x[:5], fixed))), sigma, True)
 
 
-def _spread(bent: OptimizeResult, spare: int) -> Array:
+def _spread(fit: OptimizeResult, spare: int) -> Array:
     """Return the covariance (5, 5) of the terms of a lens at a minimum."""
     # the loss is about rms^2 / 2 per spare coordinate; the weak priors are in the Jacobian
-    inverse = np.linalg.pinv(bent.jac.T @ bent.jac, hermitian=True)
-    return np.asarray(inverse[:5, :5] * (2 * bent.cost / spare))
+    inverse = np.linalg.pinv(fit.jac.T @ fit.jac, hermitian=True)
+    return np.asarray(inverse[:5, :5] * (2 * fit.cost / spare))
 
 
 def _layout(points: Complexes, body: Complexes) -> Complexes:

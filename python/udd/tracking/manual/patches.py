@@ -12,7 +12,7 @@ from udd.video.reader import Picture
 from udd.video.rgb_frames import rgb
 
 CLICK = 1.5  # Pixels by which a hand misses in each direction, if the screen shows each pixel.
-FOUND = 0.3  # Error of a patch's middle in pixels: colours have half the resolution.
+REFINED = 0.3  # Error of a patch's middle in pixels: colours have half the resolution.
 ALIKE = 0.94  # Cosine between the directions of a pixel's colour and the patch's: 20 degrees.
 HALF = 0.5  # Share of the colour's strength in a pixel that is half patch, half disk.
 SMALLEST = 6  # Least half-resolution pixels of a patch.
@@ -49,7 +49,7 @@ class Patch:
     @property
     def refined(self) -> bool:
         """True if the patch gives the centre better than the click."""
-        return self.sigma <= FOUND
+        return self.sigma <= REFINED
 
     def holds(self, at: complex) -> bool:
         """Return True if a place lies within the patch, or near the click."""
@@ -95,7 +95,7 @@ def patch(picture: Picture, at: complex, full_range: bool, miss: float = CLICK) 
     hidden = _beside(part, picture) > HIDDEN or (size < FULL * sides and size > 4 * SMALLEST)
     if hidden:
         return Patch(at, colour, miss, 4.0 * size, outline)
-    return Patch(_middle(part, along / float(np.median(along[inner]))), colour, FOUND, 4.0 * size, outline)
+    return Patch(_middle(part, along / float(np.median(along[inner]))), colour, REFINED, 4.0 * size, outline)
 
 
 def _middle(part: NDArray[np.bool_], share: NDArray[np.float32]) -> complex:

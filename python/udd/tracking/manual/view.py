@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from udd.tracking.overlay import CONTACT, FOUND, SAID
+from udd.tracking.overlay import CONTACT, FITTED, SAID
 from udd.video.rgb_frames import rgb
 
 from .questions import ClickSession
@@ -46,7 +46,7 @@ class ClickView:
         self.upright = self.loupe.axvline(0.0, color=_of(SAID), lw=0.6)
         at: dict[str, Any] = {"ha": "left", "va": "top", "transform": figure.transFigure}
         self.asked = figure.text(0.02, 0.985, "", fontsize=12, weight="bold", **at)
-        self.told = figure.text(0.02, 0.915, "", fontsize=10, **at)
+        self.remark_text = figure.text(0.02, 0.915, "", fontsize=10, **at)
         self.keys = figure.text(0.02, 0.045, "", fontsize=9, color="0.35", **at)
         self.look(complex(width / 2, height / 2))
 
@@ -70,8 +70,8 @@ class ClickView:
         self.drawn = []
         clicks = self.clicks
         self.asked.set_text(fill(clicks.sentence, WIDE))
-        self.told.set_text(fill(clicks.remark or clicks.hint, NARROW))
-        self.told.set_color("tab:red" if clicks.remark else "0.2")
+        self.remark_text.set_text(fill(clicks.remark or clicks.hint, NARROW))
+        self.remark_text.set_color("tab:red" if clicks.remark else "0.2")
         keys = KEYS + (OTHER if frames > 1 else "")
         self.keys.set_text(f"{keys}     (frame at {clicks.picture.t:.2f} s, {number} of {frames})")
         said = [*self._pivot(), *self._marks(), *self._ruler(), *self._rim(), *self._region()]
@@ -94,8 +94,8 @@ class ClickView:
         said = []
         for number, mark in enumerate(self.clicks.answers.marks, start=1):
             if len(mark.outline):
-                self._line([*mark.outline, mark.outline[0]], FOUND)
-            self._points([mark.centre], "x", FOUND)
+                self._line([*mark.outline, mark.outline[0]], FITTED)
+            self._points([mark.centre], "x", FITTED)
             style: dict[str, Any] = {"color": "white", "weight": "bold", "fontsize": 9, "clip_on": True}
             style["bbox"] = {"fc": "black", "ec": "none", "alpha": 0.6, "pad": 1}
             place = (mark.centre.real, mark.centre.imag)
@@ -121,13 +121,13 @@ class ClickView:
         points, edge = self.clicks.answers.rim, self.clicks.edge
         if not points:
             return []
-        self._points(points, ".", FOUND)
+        self._points(points, ".", FITTED)
         if edge is None:
             return (
                 [("centre", _pixels(points[0]))] if len(points) == 1 else [("edge", f"{len(points)} points")]
             )
-        self._line(edge.centre + edge.radius * np.exp(2j * np.pi * np.arange(129) / 128), FOUND)
-        self._points([edge.centre], "+", FOUND)
+        self._line(edge.centre + edge.radius * np.exp(2j * np.pi * np.arange(129) / 128), FITTED)
+        self._points([edge.centre], "+", FITTED)
         return [("centre", _pixels(edge.centre)), ("radius", f"{edge.radius:.1f}")]
 
     def _region(self) -> list[tuple[str, str]]:

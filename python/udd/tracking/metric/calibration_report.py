@@ -26,7 +26,7 @@ from .pixels_to_metres import Camera
 CLOSE_ENOUGH = 6.0  # mm: error of a contact that the support alone shows
 BLOCKS = 20  # stretches of the film whose means are the independent pieces
 MINOR = 0.1  # share of the given place below which the film alone is named
-APART = 5.0  # standard errors between the given place and that of the film, beyond which one of them is wrong
+DISAGREES = 5.0  # standard errors between given and fitted place beyond which one of them is wrong
 
 
 def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOptions) -> Camera:
@@ -55,7 +55,7 @@ def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOp
         if contact is None or not given_sigma or not options.calibrate.pivot:
             return camera(place, given_sigma / size.value, "given")
         of_film = float(contact.covariance[0, 0])
-        if abs(contact.place - place) < APART * np.hypot(given_sigma, np.sqrt(of_film)):
+        if abs(contact.place - place) < DISAGREES * np.hypot(given_sigma, np.sqrt(of_film)):
             share = of_film / (of_film + given_sigma**2)  # of the given place
             sigma = float(np.sqrt(share) * given_sigma) / size.value
             how = "rolling constraint" if share < MINOR else "rolling constraint and given"

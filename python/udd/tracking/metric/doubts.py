@@ -7,7 +7,7 @@ import numpy as np
 from .apparent_gravity import STANDARD, ApparentGravity
 from .pixels_to_metres import Camera
 
-APART = 4.0  # standard errors by which gravity may differ
+GRAVITY_LIMIT = 4.0  # standard errors by which gravity may differ
 OFF = 0.1  # relative difference of times from which on clock or scale are in doubt
 DRIVEN = 8.0  # standard errors by which a drive's direction is known
 SLOWEST = 0.004  # m/s: a slower drive has no direction worth a name
@@ -72,7 +72,7 @@ def doubts(gravity: ApparentGravity | None, camera: Camera, fps: float, turns: i
 def _by_gravity(gravity: ApparentGravity, camera: Camera, fps: float) -> list[str]:
     sentences = []
     slower, sigma = gravity.slower, 0.5 * gravity.slower * gravity.sigma / abs(gravity.value)
-    if abs(np.log(slower)) > max(OFF, APART * sigma / slower):
+    if abs(np.log(slower)) > max(OFF, GRAVITY_LIMIT * sigma / slower):
         sentences.append(
             f"gravity is {abs(gravity.value):.3g} m/s^2 by the film's clock and scale, not {STANDARD:g}: its "
             f"times are {slower:.2f} ± {sigma:.2g} times too long (then say fps={fps * slower:.4g}), or the "

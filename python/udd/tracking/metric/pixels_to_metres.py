@@ -115,8 +115,8 @@ def pixels(m: Measurement) -> Pixels:
         return _of_pendulum(m)
     scale = float(m.meta["px_per_m"])
     pivot = complex(float(m.meta["pivot_u"]), float(m.meta["pivot_v"]))
-    bent = [float(x) for x in m.meta["lens"]]
-    lens = Lens(complex(bent[0], bent[1]), *bent[2:]) if bent else PLAIN
+    terms = [float(x) for x in m.meta["lens"]]
+    lens = Lens(complex(terms[0], terms[1]), *terms[2:]) if terms else PLAIN
     places = np.array(m.meta["marks_px"], dtype=float) @ [1, 1j]
     radius = scale * float(m.meta["R"])
     codes = m.meta.get("marks_rgb", STANDARD.colours)  # an older file says nothing

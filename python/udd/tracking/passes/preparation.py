@@ -23,7 +23,7 @@ from udd.tracking.detection.illumination import evenness
 from udd.tracking.detection.occluder import visible
 from udd.tracking.detection.survey import Moving, Survey, moving, repeats_last
 from udd.tracking.geometry.contact_point import Contact, rough_contact
-from udd.tracking.geometry.lens import Bent, Lens, calibrate
+from udd.tracking.geometry.lens import Lens, LensFit, calibrate
 from udd.tracking.geometry.pose import DiskAppearance, Motion, Pose
 from udd.tracking.marks.learning import MOST, first_look, places, refine
 from udd.tracking.marks.localization import MISFIT
@@ -109,12 +109,12 @@ def prepare(
         look = refine(look, frames, view, fixed=fixed)
     for _ in range(LENS_ROUNDS):
         at = places(look, frames[:FOR_LENS], view)
-        bent = calibrate(at, view.shape, body, wanted.given("lens"), wanted.given("tilt"))
-        if bent.lens.plain:
+        lens_fit = calibrate(at, view.shape, body, wanted.given("lens"), wanted.given("tilt"))
+        if lens_fit.lens.plain:
             break
-        look = replace(look, lens=bent.lens)
+        look = replace(look, lens=lens_fit.lens)
         for (_, pose, _), m in zip(frames, in_motion, strict=True):
-            pose.centre, pose.angle = _in_plane(bent.lens, m.sight, body)
+            pose.centre, pose.angle = _in_plane(lens_fit.lens, m.sight, body)
         look = refine(look, frames, view, fixed=fixed)
     else:
         frames = frames[:0]
@@ -138,22 +138,22 @@ def prepare(
     look = _centred(look, 0j if rim is None or fixed is not None else rim.centre, options)
     contact = _contact(in_motion, look)
     estimates = {
-        **lens_estimates(bent, look.lens, wanted),
+        **lens_estimates(lens_fit, look.lens, wanted),
         **readout_estimate(rolling, wanted),
         **exposure_estimate(open_for, wanted),
     }
     return TrackerState(look, view, colours, open_for.value, white, contact, estimates), rim
 
 
-def lens_estimates(bent: Bent, lens: Lens, wanted: Calibrate) -> dict[str, Estimate]:
+def lens_estimates(lens_fit: LensFit, lens: Lens, wanted: Calibrate) -> dict[str, Estimate]:
     """Lens and tilt as rows of the table."""
     names = ("lens", "tilt across", "tilt upward", "aspect", "shear")
     values = (lens.curve, lens.tilt_u, lens.tilt_v, lens.aspect, lens.shear)
-    how = "found" if bent.is_significant else "none found"
+    how = "found" if lens_fit.is_significant else "none found"
     items = ("lens", *["tilt"] * 4)
     return {
         name: wanted.estimate(item, value, float(sigma), how)
-        for name, item, value, sigma in zip(names, items, values, bent.sigma, strict=True)
+        for name, item, value, sigma in zip(names, items, values, lens_fit.sigma, strict=True)
     }
 
 

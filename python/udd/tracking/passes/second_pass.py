@@ -22,9 +22,9 @@ from .tracks import FrameTrack, Tracks, found_in, lost_in
 Array = NDArray[np.float64]
 KNOWN = [MISFIT, MISFIT, MISFIT]  # rounds from the first pass's pose
 FORESEEN = [1.5, 0.8, MISFIT, MISFIT]  # rounds from the neighbours alone
-APART = 1.5  # pixels that the second pass may differ from the first at the marks ...
-APART_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
-FORESEEN_APART = 6.0  # pixels, the same from the neighbours' prediction
+MOST_MOVED = 1.5  # pixels that the second pass may differ from the first at the marks ...
+MOVED_BY_STREAK = 0.08  # ... and more for a streak, per pixel of its length
+MOST_MOVED_FORESEEN = 6.0  # pixels, the same from the neighbours' prediction
 
 
 def refine(
@@ -121,7 +121,7 @@ def _refined(
     if fit is None:
         return None
     away = abs(pose.centre - here.pose.centre) + abs(pose.angle - here.pose.angle) * state.look.reach
-    if away > (APART if here.tracked else FORESEEN_APART) + APART_BY_STREAK * streak:
+    if away > (MOST_MOVED if here.tracked else MOST_MOVED_FORESEEN) + MOVED_BY_STREAK * streak:
         return None
     if streak > LONG and fit.used.sum() < WEAK_MARKS and not here.tracked:
         return None  # two pale streaks fit in many places

@@ -134,14 +134,14 @@ def _laid(
     body, wanted, shape = options.layout.unit, options.calibrate, film.size[::-1]
     good = np.flatnonzero(np.isfinite(points).sum(axis=1) >= 4)
     some = good[:: max(1, len(good) // FOR_LENS)]
-    bent = calibrate(points[some], shape, body, wanted.given("lens"), wanted.given("tilt"))
-    flat = bent.lens.plane(points)
+    lens_fit = calibrate(points[some], shape, body, wanted.given("lens"), wanted.given("tilt"))
+    flat = lens_fit.lens.plane(points)
     size = float(np.median([_rough(flat[k], body)[1] for k in good]))
     places = size * body
     for _ in range(2 if wanted.layout else 0):
         places = places + _displaced(flat[good], places)
     marks = [Mark(complex(z), (0.0, 0.0), 0.0, 0.0) for z in places]
-    look = DiskAppearance(marks, 0.0, 1.0, film.light, np.inf, bent.lens)
+    look = DiskAppearance(marks, 0.0, 1.0, film.light, np.inf, lens_fit.lens)
     frames: list[FrameTrack] = []
     angle = 0.0
     for at, (t, flag) in zip(flat, notes, strict=True):
@@ -158,7 +158,7 @@ def _laid(
             frames.append(found_in(t, fit, pose, np.nan, "fast"))
     open_for, readout = wanted.given("exposure"), wanted.given("readout")
     estimates = {
-        **lens_estimates(bent, look.lens, wanted),
+        **lens_estimates(lens_fit, look.lens, wanted),
         **readout_estimate(Readout(readout or 0.0, np.inf if readout is None else 0.0), wanted),
         **exposure_estimate(Exposure(open_for or 0.0, np.inf if open_for is None else 0.0), wanted),
     }
