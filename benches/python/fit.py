@@ -38,11 +38,11 @@ def main() -> None:
             best = np.inf
             for _ in range(options.turns):
                 began = time.process_time()
-                found = udd.fit(measured, start)
+                fit = udd.fit(measured, start)
                 best = min(best, time.process_time() - began)
-            z = [(found.parameters[n] - truth.parameters[n]) / found.errors[n] for n in NAMES]
+            z = [(fit.parameters[n] - truth.parameters[n]) / fit.errors[n] for n in NAMES]
             off = ", ".join(f"{n} {value:+.2f}" for n, value in zip(NAMES, z, strict=True))
-            print(f"{frames:6d} frames, record {seed}: {best:.4f} s; {off}; level {found.level}", flush=True)
+            print(f"{frames:6d} frames, record {seed}: {best:.4f} s; {off}; level {fit.level}", flush=True)
 
 
 if __name__ == "__main__":

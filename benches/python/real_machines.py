@@ -95,7 +95,7 @@ def chain(folder: Path) -> list[dict[str, Any]]:
         motors=True,
     )
     since = time.perf_counter()
-    found = udd.discover(fitted, known, free=["I1", "I2", "r1", "r2", "b1", "b2"])
+    discovery = udd.discover(fitted, known, free=["I1", "I2", "r1", "r2", "b1", "b2"])
     took = time.perf_counter() - since
 
     def errors(fit: udd.Fit) -> list[float]:
@@ -113,11 +113,11 @@ def chain(folder: Path) -> list[dict[str, Any]]:
     return [
         {
             "machine": "double pendulum, A_00 fitted, A_05 forecast",
-            "verdict": str(found.verdict),
-            "effects": [effect.title or effect.name for effect in found.model.effects],
-            "numbers": {n: (v, found.fit.errors[n]) for n, v in found.fit.parameters.items()},
-            "before": errors(found.baseline),
-            "after": errors(found.fit),
+            "verdict": str(discovery.verdict),
+            "effects": [effect.title or effect.name for effect in discovery.model.effects],
+            "numbers": {n: (v, discovery.fit.errors[n]) for n, v in discovery.fit.parameters.items()},
+            "before": errors(discovery.baseline),
+            "after": errors(discovery.fit),
             "unit": unit,
             "seconds": took,
         },
@@ -150,15 +150,15 @@ def pendulums(folder: Path) -> list[dict[str, Any]]:
     for name, (file, columns, length) in PENDULUMS.items():
         measured = udd.read_measurement(folder / file, columns=columns)
         since = time.perf_counter()
-        found = udd.discover(measured, udd.Pendulum(length, k0=0.01 * length**2))
+        discovery = udd.discover(measured, udd.Pendulum(length, k0=0.01 * length**2))
         rows.append(
             {
                 "machine": name,
-                "verdict": str(found.verdict),
-                "effects": [effect.title or effect.name for effect in found.model.effects],
-                "ratio": found.ratio,
-                "before": 1e3 * found.error_before.whole,
-                "after": 1e3 * found.error_after.whole,
+                "verdict": str(discovery.verdict),
+                "effects": [effect.title or effect.name for effect in discovery.model.effects],
+                "ratio": discovery.ratio,
+                "before": 1e3 * discovery.error_before.whole,
+                "after": 1e3 * discovery.error_after.whole,
                 "unit": "mrad",
                 "seconds": time.perf_counter() - since,
             }

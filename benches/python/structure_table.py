@@ -51,11 +51,11 @@ def period_by_scipy(model: udd.Model, state: np.ndarray, period: float) -> float
 def lorenz_cycles(longest: int = 7, n: int = 20_000) -> dict[str, udd.PeriodicOrbit]:
     """Cycles by the sides of their turns, each from the chaotic motion's closest return of that kind."""
     lorenz = udd.Model(["x", "y", "z"], ["10*(y-x)", "28*x-y-x*z", "x*y-8/3*z"])
-    found = udd.poincare(lorenz, "z'", n, state0=[1.0, 1.0, 20.0], direction="down")
-    right = found.state[:, 0] > 0
+    section = udd.poincare(lorenz, "z'", n, state0=[1.0, 1.0, 20.0], direction="down")
+    right = section.state[:, 0] > 0
     cycles: dict[str, udd.PeriodicOrbit] = {}
     for turns in range(2, longest + 1):
-        gap = np.linalg.norm(found.state[turns:] - found.state[:-turns], axis=1)
+        gap = np.linalg.norm(section.state[turns:] - section.state[:-turns], axis=1)
         for i in np.argsort(gap)[:4000]:
             word = "".join("LR"[int(side)] for side in right[i : i + turns])
             mirrored = word.translate(str.maketrans("LR", "RL"))
@@ -65,8 +65,8 @@ def lorenz_cycles(longest: int = 7, n: int = 20_000) -> dict[str, udd.PeriodicOr
             if any(name == name[:k] * (turns // k) for k in range(1, turns) if turns % k == 0):
                 continue
             try:
-                lasts = float(found.t[i + turns] - found.t[i])
-                cycles[name] = udd.periodic_orbit(lorenz, found.state[i], period=lasts)
+                lasts = float(section.t[i + turns] - section.t[i])
+                cycles[name] = udd.periodic_orbit(lorenz, section.state[i], period=lasts)
             except udd.UddError:
                 continue
     return cycles

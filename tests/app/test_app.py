@@ -185,11 +185,11 @@ def test_sections_grow_and_are_those_of_poincare(client: TestClient) -> None:
 def test_the_diagram_tells_coexisting_attractors_apart() -> None:
     # Between 5.394713224 and 7.09642643066 the DLE has an asymmetric pair of figure-eights (reference).
     start = spec.start_of({"model": {"kind": "dle", "w": 6.5}, "state": [1.0, 1.0, 0.01]})
-    found = maps.diagram(start, 6.4, 6.6, 5)
+    diagram = maps.diagram(start, 6.4, 6.6, 5)
     exponents = maps.exponents(start, 6.4, 6.6, 5)
-    assert found.points.shape == (3, 5, 40, 3)
-    assert set(np.unique(found.label)) == {1.0, 2.0}
-    assert (found.period == 2).all()
+    assert diagram.points.shape == (3, 5, 40, 3)
+    assert set(np.unique(diagram.label)) == {1.0, 2.0}
+    assert (diagram.period == 2).all()
     assert np.abs(exponents.exponent).max() < 0.05  # periodic: zero, but for the short run
 
 

@@ -106,14 +106,14 @@ def test_unrelated_neighbours_have_no_exponent() -> None:
 
 def test_mirror_images_have_mirrored_basins() -> None:
     # omega, y -> -omega, -y is a symmetry to the last bit, and so is the grid.
-    found = udd.basins(udd.DLE(6.2), square(3, 24), state0=[0, 0, 0], n=48)
-    assert found["kind"].to_numpy().tolist() == [1, 1]
-    assert found["period"].to_numpy().tolist() == [2, 2]
-    assert found["mirror"].to_numpy().tolist() == [2, 1]
-    labels = found["attractor"].to_numpy()
+    basins = udd.basins(udd.DLE(6.2), square(3, 24), state0=[0, 0, 0], n=48)
+    assert basins["kind"].to_numpy().tolist() == [1, 1]
+    assert basins["period"].to_numpy().tolist() == [2, 2]
+    assert basins["mirror"].to_numpy().tolist() == [2, 1]
+    labels = basins["attractor"].to_numpy()
     assert np.array_equal(labels[::-1], 3 - labels)
-    assert found["fraction"].to_numpy().tolist() == [0.5, 0.5]
-    assert found["attractor"].dims == ("omega", "z")
+    assert basins["fraction"].to_numpy().tolist() == [0.5, 0.5]
+    assert basins["attractor"].dims == ("omega", "z")
 
 
 @pytest.mark.parametrize(
@@ -127,12 +127,12 @@ def test_mirror_images_have_mirrored_basins() -> None:
     ],
 )
 def test_attractors_coexist_where_they_should(w: float, attractors: list[tuple[int, bool]]) -> None:
-    found = udd.basins(udd.DLE(w), square(4, 20), state0=[0, 0.5, 0], n=48, transient=200)
-    own = found["mirror"] == found["number"]
-    assert sorted(zip(found["period"].to_numpy().tolist(), own.to_numpy().tolist(), strict=True)) == sorted(
+    basins = udd.basins(udd.DLE(w), square(4, 20), state0=[0, 0.5, 0], n=48, transient=200)
+    own = basins["mirror"] == basins["number"]
+    assert sorted(zip(basins["period"].to_numpy().tolist(), own.to_numpy().tolist(), strict=True)) == sorted(
         attractors
     )
-    assert float(found["fraction"].sum()) == pytest.approx(1.0)
+    assert float(basins["fraction"].sum()) == pytest.approx(1.0)
 
 
 def test_above_the_hopf_bifurcation_rotation_has_a_finite_basin() -> None:
@@ -141,15 +141,15 @@ def test_above_the_hopf_bifurcation_rotation_has_a_finite_basin() -> None:
     # The chaotic set is a transient with a mean lifetime of 26800. A sixth of the 1024 orbits begin in it
     # and are followed from 400 points to 900, through 1600 time units, before it could pass for an attractor:
     # ten are expected to end meanwhile, and that none does has a probability of 3e-5.
-    found = udd.basins(model, square(3, 32), state0=[0, 1, 0], transient=300, max_extension=4)
-    assert found["kind"].to_numpy().tolist() == [0, 0]
-    orbits = np.stack([found[f"orbit_{name}"].to_numpy()[:, 0] for name in ("omega", "y", "z")], axis=1)
+    basins = udd.basins(model, square(3, 32), state0=[0, 1, 0], transient=300, max_extension=4)
+    assert basins["kind"].to_numpy().tolist() == [0, 0]
+    orbits = np.stack([basins[f"orbit_{name}"].to_numpy()[:, 0] for name in ("omega", "y", "z")], axis=1)
     expected = np.sqrt(3.7) * np.array([[1, 1, 0], [-1, -1, 0]])
     assert np.abs(np.sort(orbits, axis=0) - np.sort(expected, axis=0)).max() < 1e-3
     # No attractor, and never called one.
-    endings = found["ending"].to_numpy().tolist()
+    endings = basins["ending"].to_numpy().tolist()
     assert endings == ["attractor 1", "attractor 2", "undecided"]
-    assert 0.05 < float(found["fraction"].sel(ending="undecided")) < 0.5
+    assert 0.05 < float(basins["fraction"].sel(ending="undecided")) < 0.5
 
 
 def test_below_the_hopf_bifurcation_nothing_comes_to_rest() -> None:
@@ -174,16 +174,16 @@ def test_chaos_is_an_attractor() -> None:
 def test_what_leaves_the_disk_is_ejected() -> None:
     axis = np.linspace(-0.09, 0.09, 13)
     model = udd.Disk(0.039)
-    found = udd.basins(model, {"Y": axis, "Z": axis}, state0=[0, 0, 0, 0], n=24, transient=24)
-    names = np.array(found["outcome"].attrs["flag_meanings"].split())[found["outcome"].to_numpy()]
+    basins = udd.basins(model, {"Y": axis, "Z": axis}, state0=[0, 0, 0, 0], n=24, transient=24)
+    names = np.array(basins["outcome"].attrs["flag_meanings"].split())[basins["outcome"].to_numpy()]
     outside = np.hypot(axis[:, None], axis[None, :]) >= model.R
     assert np.array_equal(names == "start_outside", outside)
     ejected = names == "ejected"
     # physics.md: of random starts at 3.9 cm/s about half or more leave within two minutes.
     assert ejected.sum() > 0.4 * (~outside).sum()
-    share = float(found["fraction"].sel(ending="ejected"))
+    share = float(basins["fraction"].sel(ending="ejected"))
     assert share == pytest.approx(ejected.sum() / (~outside).sum())
-    assert (found["Y"].attrs["units"], found["orbit_Omega"].attrs["units"]) == ("m", "rad/s")
+    assert (basins["Y"].attrs["units"], basins["orbit_Omega"].attrs["units"]) == ("m", "rad/s")
 
 
 # --- the result as data
@@ -244,11 +244,11 @@ def test_ctrl_c_gives_what_is_finished() -> None:
 
 def test_the_picture_has_a_colour_for_each_ending() -> None:
     axis = np.linspace(-0.09, 0.09, 9)
-    found = udd.basins(udd.Disk(0.071), {"Y": axis, "Z": axis}, state0=[0, 0, 0, 0], n=24)
-    ax = udd.plot.basins(found)
+    basins = udd.basins(udd.Disk(0.071), {"Y": axis, "Z": axis}, state0=[0, 0, 0, 0], n=24)
+    ax = udd.plot.basins(basins)
     legend = ax.get_legend()
     assert legend is not None
-    assert len(legend.get_texts()) == found.sizes["ending"]
+    assert len(legend.get_texts()) == basins.sizes["ending"]
     assert (ax.get_xlabel(), ax.get_ylabel()) == (
         "Y (to the right) at the start [cm]",
         "Z (up) at the start [cm]",

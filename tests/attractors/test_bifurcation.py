@@ -146,14 +146,14 @@ def grown(found: xr.Dataset, square: Floats, degree: int) -> float:
 def test_the_period_doubles_where_it_should() -> None:
     # physics.md: the first period doubling of the asymmetric pair is at w = 5.394713224.
     w = 5.394713224 - np.array([0.16, 0.12, 0.09, 0.06, 0.04, 0.02])
-    found = udd.bifurcation(udd.DLE(1.0), "w", w, n=60)
-    assert (found["period"] == 4).all()
+    diagram = udd.bifurcation(udd.DLE(1.0), "w", w, n=60)
+    assert (diagram["period"] == 4).all()
     above = udd.bifurcation(udd.DLE(1.0), "w", [5.41, 5.45], n=60)
     assert (above["period"] == 2).all()
-    omega = found["omega"].to_numpy()[0, 0]
+    omega = diagram["omega"].to_numpy()[0, 0]
     square = (omega[:, -1] - omega[:, -3]) ** 2
     # A cubic in the square: what it leaves is measured by leaving out the farthest points, below 1e-5.
-    assert grown(found, square, 3) == pytest.approx(5.394713224, abs=2e-5)
+    assert grown(diagram, square, 3) == pytest.approx(5.394713224, abs=2e-5)
 
 
 def kinds(found: Any) -> list[str]:
@@ -191,11 +191,11 @@ def test_a_motion_of_two_frequencies_is_a_torus() -> None:
 def test_the_symmetry_breaks_where_it_should() -> None:
     # physics.md: w = 7.09642643066. The section points of a symmetric orbit are mirror images of each other.
     w = 7.09642643066 - np.array([0.3, 0.24, 0.18, 0.12, 0.08, 0.04])
-    found = udd.bifurcation(udd.DLE(1.0), "w", w)
-    assert (found["period"] == 2).all()
-    assert (found["symmetric"] == 0).all()
-    omega = found["omega"].to_numpy()[0, 0]
-    assert grown(found, (omega[:, -1] + omega[:, -2]) ** 2, 3) == pytest.approx(7.09642643066, abs=2e-4)
+    diagram = udd.bifurcation(udd.DLE(1.0), "w", w)
+    assert (diagram["period"] == 2).all()
+    assert (diagram["symmetric"] == 0).all()
+    omega = diagram["omega"].to_numpy()[0, 0]
+    assert grown(diagram, (omega[:, -1] + omega[:, -2]) ** 2, 3) == pytest.approx(7.09642643066, abs=2e-4)
     above = udd.bifurcation(udd.DLE(1.0), "w", [7.15, 7.2])
     assert (above["symmetric"] == 1).all()
 
@@ -269,11 +269,11 @@ def test_the_disk_has_the_period_that_the_full_model_should() -> None:
 
 def test_a_disk_that_leaves_the_wheels_is_an_outcome() -> None:
     starts = [[0.0, 1e-3, 0.04, 0.0], [0.0, 0.08, 0.01, 0.0]]
-    found = udd.bifurcation(udd.Disk(0.039), "W", [0.036, 0.039], initial_states=starts, n=40)
-    names = found["outcome"].attrs["flag_meanings"].split()
-    assert {names[k] for k in found["outcome"].sel(start=0).to_numpy().ravel()} == {"ejected"}
-    assert {names[k] for k in found["outcome"].sel(start=1).to_numpy().ravel()} == {"start_outside"}
-    assert (found["attractor"] == 0).all()
+    diagram = udd.bifurcation(udd.Disk(0.039), "W", [0.036, 0.039], initial_states=starts, n=40)
+    names = diagram["outcome"].attrs["flag_meanings"].split()
+    assert {names[k] for k in diagram["outcome"].sel(start=0).to_numpy().ravel()} == {"ejected"}
+    assert {names[k] for k in diagram["outcome"].sel(start=1).to_numpy().ravel()} == {"start_outside"}
+    assert (diagram["attractor"] == 0).all()
 
 
 # --- the result as data
@@ -301,12 +301,12 @@ def test_the_threads_do_not_matter() -> None:
 
 
 def test_it_says_what_it_is_of() -> None:
-    found = udd.bifurcation(udd.DLE(1.0, 0.1), "w", [2.0, 3.0], n=20, component="omega")
-    assert found.attrs["model"] == "DLE(w=1.0, B=0.1)"
-    assert (found.attrs["parameter"], found.attrs["n"], found.attrs["section"]) == ("w", 20, "z")
-    assert found["omega"].dims == ("path", "start", "w", "point")
-    assert "y" not in found
-    assert {"udd_version", "rtol", "atol", "transient", "complete"} <= set(found.attrs)
+    diagram = udd.bifurcation(udd.DLE(1.0, 0.1), "w", [2.0, 3.0], n=20, component="omega")
+    assert diagram.attrs["model"] == "DLE(w=1.0, B=0.1)"
+    assert (diagram.attrs["parameter"], diagram.attrs["n"], diagram.attrs["section"]) == ("w", 20, "z")
+    assert diagram["omega"].dims == ("path", "start", "w", "point")
+    assert "y" not in diagram
+    assert {"udd_version", "rtol", "atol", "transient", "complete"} <= set(diagram.attrs)
 
 
 @pytest.mark.parametrize(
@@ -349,7 +349,7 @@ def test_ctrl_c_gives_what_is_finished(path: str) -> None:
     timer.start()
     try:
         with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):
-            found = udd.bifurcation(
+            diagram = udd.bifurcation(
                 udd.DLE(1.0),
                 "w",
                 np.linspace(0.5, 4, 5000),
@@ -362,28 +362,28 @@ def test_ctrl_c_gives_what_is_finished(path: str) -> None:
             )
     finally:
         timer.cancel()
-    names = found["outcome"].attrs["flag_meanings"].split()
-    finished = found["outcome"] != names.index("interrupted")
+    names = diagram["outcome"].attrs["flag_meanings"].split()
+    finished = diagram["outcome"] != names.index("interrupted")
     assert 0 < int(finished.sum()) < finished.size
-    assert set(np.unique(found["outcome"])) <= {
+    assert set(np.unique(diagram["outcome"])) <= {
         names.index(n) for n in ("finished", "undecided", "interrupted")
     }
-    assert np.array_equal(np.isfinite(found["y"].to_numpy()).all(axis=-1), finished.to_numpy())
-    assert found.attrs["complete"] == 0
+    assert np.array_equal(np.isfinite(diagram["y"].to_numpy()).all(axis=-1), finished.to_numpy())
+    assert diagram.attrs["complete"] == 0
 
 
 # --- the picture and the command
 
 
 def test_the_picture_shows_the_points_and_the_hysteresis() -> None:
-    found = udd.bifurcation(udd.DLE(1.0), "w", np.linspace(6, 8, 5), n=20, path="both")
-    ax = udd.plot.bifurcation(found, component="y")
+    diagram = udd.bifurcation(udd.DLE(1.0), "w", np.linspace(6, 8, 5), n=20, path="both")
+    ax = udd.plot.bifurcation(diagram, component="y")
     drawn = sum(len(line.get_xdata()) for line in ax.lines)
-    assert drawn == found["y"].size
+    assert drawn == diagram["y"].size
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("w [1]", "y [1]")
-    assert udd.plot.bifurcation(found, ax, colour="attractor") is ax
+    assert udd.plot.bifurcation(diagram, ax, colour="attractor") is ax
     with pytest.raises(UddError, match="has no 'Z'"):
-        udd.plot.bifurcation(found, component="Z")
+        udd.plot.bifurcation(diagram, component="Z")
     with pytest.raises(UddError, match="no bifurcation diagram"):
         udd.plot.bifurcation(xr.Dataset())
     ax.figure.canvas.draw()

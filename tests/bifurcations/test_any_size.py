@@ -18,15 +18,15 @@ def ring(dim: int) -> udd.Model:
 
 @pytest.mark.parametrize("dim", range(1, 7))
 def test_equilibria_of_models_of_all_sizes(dim: int) -> None:
-    found = udd.equilibria(ring(dim))
-    states = np.array([rest.state for rest in found])
+    equilibria = udd.equilibria(ring(dim))
+    states = np.array([rest.state for rest in equilibria])
     assert states.shape[1] == dim
     for wanted in (0.5, 2.0):
         assert np.abs(states - wanted).max(axis=1).min() < 1e-9
     near = udd.equilibria(ring(dim), near=np.full(dim, 0.5), initial_states=1)
     assert np.abs(np.array([rest.state for rest in near]) - 0.5).max(axis=1).min() < 1e-9
     # The slope at 0.5 is a ring of 1.5, whose eigenvalues are 1.5 times the roots of one.
-    rest = min(found, key=lambda rest: float(np.abs(rest.state - 0.5).max()))
+    rest = min(equilibria, key=lambda rest: float(np.abs(rest.state - 0.5).max()))
     roots = 1.5 * np.exp(2j * np.pi * np.arange(dim) / dim)
     far = np.abs(rest.eigenvalues[:, None] - roots).min(axis=0)
     assert far.max() < 1e-9
@@ -89,7 +89,7 @@ def test_a_cycle_of_six_states_has_the_multipliers_of_another_integrator() -> No
     wanted = np.delete(wanted, np.argmin(np.abs(wanted - 1.0)))
     assert np.abs(wanted[:, None] - orbit.multipliers).min(axis=0).max() < 1e-9
     # Derivatives by a parameter take a run of their own there.
-    found = _core.shoot(
+    pieces = _core.shoot(
         orbit.model,
         np.array([[0.5]]),
         orbit.state[None],
@@ -99,8 +99,8 @@ def test_a_cycle_of_six_states_has_the_multipliers_of_another_integrator() -> No
         1e-13,
         1e-14,
     )
-    np.testing.assert_allclose(found["by_parameter"][0, :, 0], round_[:, 6], atol=1e-9)
-    np.testing.assert_allclose(found["by_state"][0], round_[:, :6], atol=1e-9)
+    np.testing.assert_allclose(pieces["by_parameter"][0, :, 0], round_[:, 6], atol=1e-9)
+    np.testing.assert_allclose(pieces["by_state"][0], round_[:, :6], atol=1e-9)
     branch = udd.continuation(orbit, "k", (0.1, 1.0))
     assert branch.periods == pytest.approx(orbit.period, abs=1e-9)  # which does not depend on the springs
 

@@ -72,8 +72,8 @@ def test_no_equilibrium_of_a_random_quadratic_model_is_missed(seed: int) -> None
         "+".join(f"({c!r})*{term}" for c, term in zip(row.tolist(), terms, strict=True)) for row in table
     ]
     model = udd.Model(names, texts)
-    found = udd.equilibria(model)
-    states = np.array([rest.state for rest in found]).reshape(-1, 3)
+    equilibria = udd.equilibria(model)
+    states = np.array([rest.state for rest in equilibria]).reshape(-1, 3)
     assert (np.abs(model.rates(0.0, states)) < 1e-9 * (1 + np.abs(states).max(initial=0.0)) ** 2).all()
     # Newton's method from many states.
     x = 6.0 * random.normal(size=(400, 3))
@@ -84,7 +84,7 @@ def test_no_equilibrium_of_a_random_quadratic_model_is_missed(seed: int) -> None
     good = x[np.abs(model.rates(0.0, x)).max(axis=1) < 1e-9 * (1 + np.abs(x).max(axis=1)) ** 2]
     for root in good:
         assert np.abs(states - root).max(axis=1).min() < 1e-6 * (1 + np.abs(root).max())
-    assert len(found) % 2 == 0 and len(found) <= 8
+    assert len(equilibria) % 2 == 0 and len(equilibria) <= 8
 
 
 def _slopes(table: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -14,15 +14,15 @@ def test_chaos_beside_stable_rotation_lasts_as_long_as_is_known() -> None:
     rotation = [rest for rest in udd.equilibria(model) if rest.stable]
     middle = np.array([np.sqrt(3.7), np.sqrt(3.7), -3.2])
     starts = middle + 0.05 * np.random.default_rng(3).normal(size=(128, 3))
-    found = udd.lifetimes(model, starts, rotation, t_max=30_000.0, after=1500.0)
+    lifetimes = udd.lifetimes(model, starts, rotation, t_max=30_000.0, after=1500.0)
     # The reference list's mean, of another code: 26800.
-    assert abs(found.mean - 26800.0) < 3.0 * found.standard_error
-    ended = (found.settled & (found.time > 1500.0)).sum()
-    assert ended > 20 and found.standard_error == pytest.approx(found.mean / np.sqrt(ended))
+    assert abs(lifetimes.mean - 26800.0) < 3.0 * lifetimes.standard_error
+    ended = (lifetimes.settled & (lifetimes.time > 1500.0)).sum()
+    assert ended > 20 and lifetimes.standard_error == pytest.approx(lifetimes.mean / np.sqrt(ended))
     # How near is near does not matter, but for the time that the last of the way takes.
     other = udd.lifetimes(model, starts, rotation, t_max=30_000.0, after=1500.0, near=0.1)
-    np.testing.assert_array_equal(other.settled, found.settled)
-    assert other.mean == pytest.approx(found.mean, rel=0.02)
+    np.testing.assert_array_equal(other.settled, lifetimes.settled)
+    assert other.mean == pytest.approx(lifetimes.mean, rel=0.02)
 
 
 def test_what_settles_at_once_and_what_never_does() -> None:

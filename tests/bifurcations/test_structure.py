@@ -147,29 +147,29 @@ def test_the_period_at_large_drives(figure_eight: udd.Branch) -> None:
 
 
 def test_the_asymmetric_pair_doubles_and_doubles(figure_eight: udd.Branch) -> None:
-    found = udd.cascade(figure_eight.points[0], n=5)
-    assert found.values[0] == pytest.approx(DOUBLING, abs=1e-9)  # the reference's last digit
-    assert found.errors.max() < 1e-9
-    periods = np.array([point.period for point in found.points])
+    cascade = udd.cascade(figure_eight.points[0], n=5)
+    assert cascade.values[0] == pytest.approx(DOUBLING, abs=1e-9)  # the reference's last digit
+    assert cascade.errors.max() < 1e-9
+    periods = np.array([point.period for point in cascade.points])
     # Between doublings the period changes with the drive, most before the first.
     np.testing.assert_allclose(periods[1:] / periods[:-1], 2.0, rtol=0.03)
-    for point in found.points:
+    for point in cascade.points:
         assert isinstance(point.solution, udd.PeriodicOrbit)
         assert point.solution.multipliers[0] == pytest.approx(-1.0, abs=1e-8)
     # The last ratio of five doublings is within 0.3 % of Feigenbaum's constant.
-    assert found.ratios[-1] == pytest.approx(4.669201609, rel=3e-3)
-    assert found.branches[0].ends[0] == "born at a symmetry breaking"
+    assert cascade.ratios[-1] == pytest.approx(4.669201609, rel=3e-3)
+    assert cascade.branches[0].ends[0] == "born at a symmetry breaking"
 
 
 def test_a_cascade_to_the_fifth_digit_of_feigenbaums_constant() -> None:
-    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=9)
+    cascade = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=9)
     # The ratios come nearer by a factor of 4.67 each: 9e-6 after nine doublings.
-    assert found.ratios[-1] == pytest.approx(4.669201609, abs=1e-5)
+    assert cascade.ratios[-1] == pytest.approx(4.669201609, abs=1e-5)
     # Solved for, not followed step by step: the last cycle has 256 rounds, and some 1500 pieces.
-    assert max(len(branch) for branch in found.branches[3:]) < 10
+    assert max(len(branch) for branch in cascade.branches[3:]) < 10
     # The doublings of the branch followed step by step, of another run.
-    assert found.values[5] == pytest.approx(5.0045538093, abs=1e-10)
-    assert all(branch.ends[0] == "born at a period doubling" for branch in found.branches[1:])
+    assert cascade.values[5] == pytest.approx(5.0045538093, abs=1e-10)
+    assert all(branch.ends[0] == "born at a period doubling" for branch in cascade.branches[1:])
 
 
 def test_a_step_off_a_bifurcation_does_not_jump_over_the_next() -> None:
@@ -244,11 +244,11 @@ def test_the_bound_of_a_hopf_bifurcation_holds(B: float) -> None:
 
 
 def test_the_bound_of_where_doublings_accumulate_holds() -> None:
-    found = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=6)
+    cascade = udd.cascade(udd.periodic_orbit(udd.DLE(6.0)), "w", n=6)
     # From eleven doublings.
     known = 5.0043826710
-    assert abs(found.limit - known) < found.limit_error < 1e-6
-    assert "error below" in repr(found)
+    assert abs(cascade.limit - known) < cascade.limit_error < 1e-6
+    assert "error below" in repr(cascade)
 
 
 def test_the_bound_of_a_connection_is_not_zero(rotation: udd.Branch) -> None:
@@ -394,35 +394,35 @@ def test_rotation_has_a_homoclinic_orbit_as_shilnikov_says() -> None:
     cycles = udd.continuation(
         udd.periodic_orbit(udd.DLE(0.3)), "w", (0.29, 3.0), direction="up", max_period=50.0
     )
-    found = udd.connection(cycles)
-    assert found.kind == "homoclinic" and found.wild
-    assert found.error < 1e-9
+    connection = udd.connection(cycles)
+    assert connection.kind == "homoclinic" and connection.wild
+    assert connection.error < 1e-9
     # The folds of the branch accumulate there, from both sides, at the ratio that the eigenvalues give.
-    away = np.array([fold.value for fold in cycles.find("fold")]) - found.value
+    away = np.array([fold.value for fold in cycles.find("fold")]) - connection.value
     periods = np.array([fold.period for fold in cycles.find("fold")])
     assert (np.sign(away[1:]) == -np.sign(away[:-1])).all()
-    assert -away[-1] / away[-2] == pytest.approx(found.fold_ratio, rel=0.02)
-    assert (periods[-1] - periods[-3]) / 2 == pytest.approx(found.fold_spacing, rel=0.1)
+    assert -away[-1] / away[-2] == pytest.approx(connection.fold_ratio, rel=0.02)
+    assert (periods[-1] - periods[-3]) / 2 == pytest.approx(connection.fold_spacing, rel=0.1)
     # Forward from its beginning it leaves and comes back, by another integrator.
-    k = len(found.t) // 2
+    k = len(connection.t) // 2
     run = udd.simulate(
-        udd.DLE(found.value),
-        found.t[k - 3 : k + 4],
-        found.state[k - 3],
+        udd.DLE(connection.value),
+        connection.t[k - 3 : k + 4],
+        connection.state[k - 3],
         method="dop853",
         rtol=1e-12,
         atol=1e-13,
     )
-    np.testing.assert_allclose(run.state, found.state[k - 3 : k + 4], atol=1e-7)
+    np.testing.assert_allclose(run.state, connection.state[k - 3 : k + 4], atol=1e-7)
 
 
 def test_cycles_of_the_hopf_bifurcation_end_on_the_saddle(rotation: udd.Branch) -> None:
-    found = udd.connection(udd.continuation(rotation.find("Hopf")[0], max_period=16.0))
-    np.testing.assert_allclose(found.equilibrium.state, [0.0, 0.0, 5.0], atol=1e-12)
+    connection = udd.connection(udd.continuation(rotation.find("Hopf")[0], max_period=16.0))
+    np.testing.assert_allclose(connection.equilibrium.state, [0.0, 0.0, 5.0], atol=1e-12)
     longer = udd.continuation(rotation.find("Hopf")[0], max_period=22.0)
     # The cycles come nearer by exp(-0.85 T): the branch itself is not there yet.
-    assert longer.values[-1] == pytest.approx(found.value, abs=1e-6)
-    assert found.error < 1e-9 and not found.wild
+    assert longer.values[-1] == pytest.approx(connection.value, abs=1e-6)
+    assert connection.error < 1e-9 and not connection.wild
 
 
 @pytest.mark.nightly  # test_rotation_has_a_homoclinic_orbit_as_shilnikov_says asks the same of the DLE
@@ -437,20 +437,20 @@ def test_the_disks_connection_has_cycles_that_wind_towards_it() -> None:
 
 
 def test_a_diagram_joins_what_is_seen_and_what_is_behind_it() -> None:
-    found = udd.diagram(udd.DLE(6.0), "w", np.linspace(5.2, 7.4, 12), n=40, transient=100, generations=1)
-    kinds = {(point.kind, round(point.value, 8)) for point in found.points}
+    diagram = udd.diagram(udd.DLE(6.0), "w", np.linspace(5.2, 7.4, 12), n=40, transient=100, generations=1)
+    kinds = {(point.kind, round(point.value, 8)) for point in diagram.points}
     assert kinds == {("symmetry breaking", 7.09642643), ("period doubling", 5.39471322)}
     # Stable branches pass through the points of the scan.
-    scan, w = found.scan, 6.2
+    scan, w = diagram.scan, 6.2
     seen = scan["omega"].sel(w=w, path="up").to_numpy().ravel()
-    at = [(branch, orbit) for branch in found.branches if branch.kind == "cycle" for orbit in branch.at(w)]
+    at = [(branch, orbit) for branch in diagram.branches if branch.kind == "cycle" for orbit in branch.at(w)]
     stable = [orbit for _, orbit in at if orbit.stable]
     assert stable
     section = udd.poincare(udd.DLE(w), n=2, state0=stable[0].state, transient=0, rtol=1e-12, atol=1e-14)
     own = section.component("omega")
     # The scan shows one of two mirror images.
     assert min(np.abs(np.sort(sign * own) - np.unique(seen.round(9))).max() for sign in (1, -1)) < 1e-6
-    assert found.hysteresis.shape[1] == 2 and len(found.as_dict()["branches"]) == len(found.branches)
+    assert diagram.hysteresis.shape[1] == 2 and len(diagram.as_dict()["branches"]) == len(diagram.branches)
 
 
 def test_pictures_of_branches(figure_eight: udd.Branch, rotation: udd.Branch) -> None:

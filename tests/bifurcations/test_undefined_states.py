@@ -41,12 +41,12 @@ def test_tanks_are_followed_over_their_inflow() -> None:
 
 
 def test_a_switch_has_three_states_with_an_exponent_that_is_a_parameter() -> None:
-    found = udd.equilibria(toggle_switch())
+    equilibria = udd.equilibria(toggle_switch())
     # x^3 + x = 5, and (5 +- sqrt 21)/2.
     low, high = (5 - np.sqrt(21)) / 2, (5 + np.sqrt(21)) / 2
     same = np.roots([1, 0, 1, -5])
     middle = float(same[np.isreal(same)].real[0])
-    states = np.array(sorted(rest.state.tolist() for rest in found))
+    states = np.array(sorted(rest.state.tolist() for rest in equilibria))
     np.testing.assert_allclose(states, [[low, high], [middle, middle], [high, low]], rtol=1e-10)
 
 

@@ -48,16 +48,16 @@ def test_points_are_those_of_scipy(name: str, sign: int, direction: str) -> None
     function, text = SURFACES[name]
     t, x = events(function, sign, 20.0)
     with pytest.warns(IncompleteWarning, match="time ran out"):
-        found = udd.poincare(
+        section = udd.poincare(
             udd.DLE(W), text, 1000, direction=direction, transient=0, t_max=20.0, rtol=1e-13, atol=1e-15
         )
-    assert found.found == len(t) >= 3
+    assert section.found == len(t) >= 3
     # Over 20 units of time errors grow by exp(0.31 * 20) = 500, SciPy's from 1e-13 per step.
-    np.testing.assert_allclose(found.t, t, atol=1e-9)
-    np.testing.assert_allclose(found.state, x, atol=1e-8)
-    residual = [abs(function(*point, W)) for point in zip(found.t, found.state, strict=True)]
+    np.testing.assert_allclose(section.t, t, atol=1e-9)
+    np.testing.assert_allclose(section.state, x, atol=1e-8)
+    residual = [abs(function(*point, W)) for point in zip(section.t, section.state, strict=True)]
     assert max(residual) <= 1e-12
-    assert found.residual <= 1e-12
+    assert section.residual <= 1e-12
 
 
 def test_the_periods_of_closed_orbits() -> None:
@@ -75,25 +75,25 @@ def test_reversals_at_zero_drive() -> None:
     # A swing about the contact: R0 = 0.058 m, 127 degrees from upright; |Y| shrinks from turn to turn.
     angle = np.deg2rad(127)
     start = [0.0, 0.058 * np.sin(angle), 0.058 * np.cos(angle), 0.0]
-    found = udd.poincare(udd.Disk(0.0), "reversal", 6, state0=start, transient=0)
+    section = udd.poincare(udd.Disk(0.0), "reversal", 6, state0=start, transient=0)
     expected = [0.353385, 0.699102, 1.041013, 1.381645, 1.725801, 2.198271]
-    np.testing.assert_allclose(found.t, expected, atol=1e-6)
+    np.testing.assert_allclose(section.t, expected, atol=1e-6)
     heights = [-0.0355556, 0.0264675, -0.0191920, 0.0131979, -0.0051802, 0.000173]
-    np.testing.assert_allclose(found.component("Y"), heights, atol=5e-7)
+    np.testing.assert_allclose(section.component("Y"), heights, atol=5e-7)
     # Z keeps its sign, so that Y turns where the disk does.
     turning = udd.poincare(udd.Disk(0.0), "turning points of Y", 6, state0=start, transient=0)
-    np.testing.assert_allclose(turning.t, found.t, atol=1e-12)
+    np.testing.assert_allclose(turning.t, section.t, atol=1e-12)
 
 
 def test_a_chaotic_section_is_symmetric() -> None:
-    found = udd.poincare(udd.DLE(1.0), n=20_000)
-    assert found.residual <= 1e-12
-    assert (1.0 - found.component("omega") * found.component("y") > 0).all()  # z' > 0
+    section = udd.poincare(udd.DLE(1.0), n=20_000)
+    assert section.residual <= 1e-12
+    assert (1.0 - section.component("omega") * section.component("y") > 0).all()  # z' > 0
     for name in ("omega", "y"):
-        means = found.component(name).reshape(100, 200).mean(axis=1)
+        means = section.component(name).reshape(100, 200).mean(axis=1)
         assert abs(means.mean()) < 4 * means.std(ddof=1) / 10
     # (omega, y) and (-omega, -y): the squares' means of both halves agree.
-    squares = (found.component("y") ** 2 * np.sign(found.component("y"))).reshape(100, 200).mean(axis=1)
+    squares = (section.component("y") ** 2 * np.sign(section.component("y"))).reshape(100, 200).mean(axis=1)
     assert abs(squares.mean()) < 4 * squares.std(ddof=1) / 10
 
 
@@ -142,12 +142,12 @@ def test_many_orbits_are_the_same_as_one_by_one() -> None:
 def test_orbits_without_enough_crossings_say_why() -> None:
     starts = [[0.0, 0.0, -1.0], [1.0, 1.0, 0.01]]
     with pytest.warns(IncompleteWarning, match="1 of 2 orbits have fewer than 5 crossings: escaped 1"):
-        found = udd.poincare(udd.DLE(1.0), n=5, state0=starts, transient=0, t_max=1e8)
-    assert found.outcome.tolist() == ["escaped", "finished"]
-    assert found.found.tolist() == [1, 5]
-    assert found.t[0, 0] == 1.0  # the z-axis: z = -1 + t
-    assert np.isnan(found.t[0, 1:]).all()
-    assert (found.which[0, 1:] == -1).all()
+        section = udd.poincare(udd.DLE(1.0), n=5, state0=starts, transient=0, t_max=1e8)
+    assert section.outcome.tolist() == ["escaped", "finished"]
+    assert section.found.tolist() == [1, 5]
+    assert section.t[0, 0] == 1.0  # the z-axis: z = -1 + t
+    assert np.isnan(section.t[0, 1:]).all()
+    assert (section.which[0, 1:] == -1).all()
     with pytest.warns(IncompleteWarning, match="the orbit has 0 crossings instead of 9: ejected"):
         off = udd.poincare(udd.Disk(0.05), n=9, state0=[0.0, 0.0, 0.0799, 0.0], transient=0)
     assert (off.found, off.outcome) == (0, "ejected")
@@ -176,15 +176,15 @@ def test_friction_that_sticks_has_sections() -> None:
     assert (speeds[1:] < speeds[:-1]).all()
     dry = udd.Pendulum(0.25, effects=[udd.effects.coulomb(c=0.1, treatment="set-valued")])
     with pytest.warns(IncompleteWarning, match="time ran out"):
-        found = udd.poincare(dry, n=100, state0=[0.0, 1.0], transient=0, t_max=60.0)
-    run = udd.simulate(dry, [0.0, *found.t], [0.0, 1.0], rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(run.state[1:], found.state, atol=1e-7)
+        section = udd.poincare(dry, n=100, state0=[0.0, 1.0], transient=0, t_max=60.0)
+    run = udd.simulate(dry, [0.0, *section.t], [0.0, 1.0], rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(run.state[1:], section.state, atol=1e-7)
     # It stops and sticks: no crossing follows.
     rest = udd.simulate(dry, 60.0, [0.0, 1.0])
     assert rest.events.kind[-1] == "stick"
-    assert 1 < found.found < 20
-    assert found.t[-1] < rest.events.t[-1]
-    np.testing.assert_allclose(found.end, rest.state[-1], atol=1e-6)
+    assert 1 < section.found < 20
+    assert section.t[-1] < rest.events.t[-1]
+    np.testing.assert_allclose(section.end, rest.state[-1], atol=1e-6)
     lugre = udd.Pendulum(0.25, effects=[udd.effects.coulomb(c=0.1, treatment="lugre")])
     with pytest.raises(ModelError, match="lugre"):
         udd.poincare(lugre)
@@ -256,8 +256,8 @@ def test_no_model_and_no_room() -> None:
 
 
 def test_pictures() -> None:
-    found = udd.poincare(udd.DLE(1.0), n=200)
-    ax = udd.plot.poincare(found)
+    section = udd.poincare(udd.DLE(1.0), n=200)
+    ax = udd.plot.poincare(section)
     assert isinstance(ax, Axes)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("ω [1]", "y [1]")
     assert len(ax.lines[0].get_xdata()) == 200
@@ -271,7 +271,7 @@ def test_pictures() -> None:
     with pytest.raises(udd.UddError, match="this is no section"):
         udd.plot.poincare(3)  # type: ignore[arg-type]
     with pytest.raises(ModelError, match="the state has no component 'Z'"):
-        udd.plot.return_map(found, component="Z")
+        udd.plot.return_map(section, component="Z")
 
 
 def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -83,12 +83,12 @@ def test_a_run_goes_to_standard_output(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_a_run_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    found = data(
+    answer = data(
         ["simulate", "--pendulum", "0.5", "--t", "1", "--dt", ".5", "--effect", "quadratic_drag:c=.01"],
         capsys,
     )
-    assert found["state_names"] == ["Omega", "theta"]
-    assert found["t"] == [0, 0.5, 1.0]
+    assert answer["state_names"] == ["Omega", "theta"]
+    assert answer["t"] == [0, 0.5, 1.0]
     left = data(["simulate", "--W", ".04", "--state", "0", ".01", ".07", "0", "--t", "60"], capsys)
     assert left["outcome"] == "ejected"
 
@@ -831,20 +831,20 @@ def test_the_demonstration_of_a_disk_that_lacks_nothing_takes_the_other_film(
 
 @pytest.mark.parametrize("null", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_the_demonstration(null: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = data(["demo", "--out", tmp_path / "new" / "demo", *(["--null"] if null else [])], capsys)
-    assert Path(str(found["report"])).read_text(encoding="utf-8").count("<img") >= 8
-    assert udd.read_measurement(str(found["measurement"])).meta["W"] == 0.042
-    effects = found["effects"]
+    answer = data(["demo", "--out", tmp_path / "new" / "demo", *(["--null"] if null else [])], capsys)
+    assert Path(str(answer["report"])).read_text(encoding="utf-8").count("<img") >= 8
+    assert udd.read_measurement(str(answer["measurement"])).meta["W"] == 0.042
+    effects = answer["effects"]
     assert isinstance(effects, list)
     if null:
-        assert found["verdict"] == "nothing missing"
+        assert answer["verdict"] == "nothing missing"
         return
     # The film was made with b = 6 /m. At one drive a slip c Z with c = b W acts identically: both are right.
     assert [e["name"] for e in effects] in (["relaxation"], ["slip"])
     ((_, amplitude),) = effects[0]["parameters"].items()
     b = amplitude["value"] / (1 if effects[0]["name"] == "relaxation" else 0.042)
     assert b == pytest.approx(6.0, abs=0.3)
-    ratio = found["held_out_ratio"]
+    ratio = answer["held_out_ratio"]
     assert isinstance(ratio, dict)
     assert ratio["high"] < 0.5
 

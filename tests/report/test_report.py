@@ -179,12 +179,12 @@ def test_the_motion_moves(pages: dict[str, str], name: str) -> None:
 
 
 def test_the_command_that_does_it_again() -> None:
-    found = discovered.pendulum()
-    assert words.command(found, "my swing.csv") == (
+    discovery = discovered.pendulum()
+    assert words.command(discovery, "my swing.csv") == (
         "udd discover 'my swing.csv' --pendulum 0.6 --k0 0.01 --report report.html"
     )
     assert words.command(discovered.disk(), "a.csv") == "udd discover a.csv --W 0.042 --report report.html"
-    assert words.command(found, None) is None
+    assert words.command(discovery, None) is None
 
 
 def test_noise_that_no_measurement_stated_is_not_said_to_be_stated(pages: dict[str, str]) -> None:
@@ -235,15 +235,15 @@ def test_the_input_is_named_with_its_checksum(tmp_path: Path) -> None:
 
 
 def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
-    found = discovered.pendulum()
+    discovery = discovered.pendulum()
     with pytest.raises(UddError, match="there is no folder"):
-        found.report(tmp_path / "absent" / "page.html")
+        discovery.report(tmp_path / "absent" / "page.html")
     with pytest.raises(UddError, match="is a folder"):
-        found.report(tmp_path)
+        discovery.report(tmp_path)
     with pytest.raises(UddError, match="cannot be read"):
-        found.report(tmp_path / "page.html", source=tmp_path / "absent.csv")
+        discovery.report(tmp_path / "page.html", source=tmp_path / "absent.csv")
     with pytest.raises(UddError, match="cannot be read"):
-        found.report(tmp_path / "page.html", film=tmp_path / "absent.mp4")
+        discovery.report(tmp_path / "page.html", film=tmp_path / "absent.mp4")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -342,11 +342,11 @@ def test_contents_guide_and_data_are_on_the_page(pages: dict[str, str]) -> None:
 def test_effects_that_act_identically_have_equal_bars() -> None:
     from udd.plot.evidence import decreases
 
-    found = discovered.disk()
-    (effect,) = found.effects
-    alike = [other.title for other in found.alternatives if other.likeness > words.IDENTICAL]
+    discovery = discovered.disk()
+    (effect,) = discovery.effects
+    alike = [other.title for other in discovery.alternatives if other.likeness > words.IDENTICAL]
     assert alike
-    assert {decreases(found, 0)[title] for title in alike} == {effect.chi2}
+    assert {decreases(discovery, 0)[title] for title in alike} == {effect.chi2}
 
 
 def test_the_origin_of_a_film_is_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -360,15 +360,15 @@ def test_errors_of_the_known_model_contain_what_it_lacks() -> None:
     """Those that `udd.fit` reports of the same record, and not the hundredth part of them."""
     from udd.report import tables
 
-    found = discovered.disk()
-    alone = udd.fit(found.measurement, udd.Disk(discovered.DRIVE))
-    row = next(row for row in tables.parameters(found) if row["name"] == "W")
+    discovery = discovered.disk()
+    alone = udd.fit(discovery.measurement, udd.Disk(discovered.DRIVE))
+    row = next(row for row in tables.parameters(discovery) if row["name"] == "W")
     value, _, brackets = str(row["before"]).rstrip(")").partition("(")
     digits = 0 if "." in brackets else len(value.partition(".")[2])
     error = float(brackets) / 10**digits
     unit = {"m/s": 1.0, "cm/s": 1e2, "mm/s": 1e3}[str(row["unit"])]
     assert error == pytest.approx(unit * alone.errors["W"], rel=0.2)
-    assert alone.errors["W"] > 20 * found.baseline.errors["W"]
+    assert alone.errors["W"] > 20 * discovery.baseline.errors["W"]
 
 
 def test_a_written_model_of_a_pendulum_keeps_its_own_model_error() -> None:
@@ -384,15 +384,17 @@ def test_a_written_model_of_a_pendulum_keeps_its_own_model_error() -> None:
 
 
 def test_an_error_below_the_noise_is_called_no_more_than_noise() -> None:
-    found = discovered.disk()
-    numbers = words.headline(found)
-    h = found.horizon
-    value, floor = found.error_after.at(h)[0], found.error_after.at(h)[3]
+    discovery = discovered.disk()
+    numbers = words.headline(discovery)
+    h = discovery.horizon
+    value, floor = discovery.error_after.at(h)[0], discovery.error_after.at(h)[3]
     assert numbers.before_note == ""
     assert numbers.after_note == ("no more than noise" if value <= floor else "")
     for error, note in ((1.0, "no more than noise"), (1.01, "")):
-        median = np.full_like(found.error_after.median, error * floor)
-        scaled = dataclasses.replace(found, error_after=dataclasses.replace(found.error_after, median=median))
+        median = np.full_like(discovery.error_after.median, error * floor)
+        scaled = dataclasses.replace(
+            discovery, error_after=dataclasses.replace(discovery.error_after, median=median)
+        )
         assert words.headline(scaled).after_note == note
 
 

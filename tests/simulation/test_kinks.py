@@ -55,14 +55,14 @@ def test_all_methods_land_on_the_kinks(name: str) -> None:
 def test_derivatives_pass_through_the_kinks(name: str) -> None:
     model, _ = STARTS[name]
     start, by = np.array([1.0, 0.2]), 1e-6
-    found = _core.shoot(model, np.zeros((1, 0)), start[None], np.zeros(1), np.full(1, 6.0), [], 1e-12, 1e-14)
+    pieces = _core.shoot(model, np.zeros((1, 0)), start[None], np.zeros(1), np.full(1, 6.0), [], 1e-12, 1e-14)
 
     def end(x: np.ndarray) -> np.ndarray:
         return udd.simulate(model, [0, 6], x, method="dop853", rtol=1e-13, atol=1e-15).state[-1]
 
     apart = [(end(start + by * e) - end(start - by * e)) / (2 * by) for e in np.eye(2)]
     # Central differences of runs to 1e-13 over 2e-6.
-    np.testing.assert_allclose(found["by_state"][0], np.transpose(apart), atol=3e-6)
+    np.testing.assert_allclose(pieces["by_state"][0], np.transpose(apart), atol=3e-6)
 
 
 def test_more_kinks_than_surfaces_are_compared() -> None:

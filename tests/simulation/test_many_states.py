@@ -122,7 +122,7 @@ def test_exponents_of_many_states_add_up_to_the_divergence(n: int) -> None:
 
 def test_sections_of_many_states_agree_with_scipy() -> None:
     n = 8
-    found = udd.poincare(ring(n), "x0 - 2", 4, state0=np.arange(8.0), direction="up", transient=0)
+    section = udd.poincare(ring(n), "x0 - 2", 4, state0=np.arange(8.0), direction="up", transient=0)
 
     def surface(_t: float, x: NDArray[np.float64]) -> float:
         return float(x[0] - 2.0)
@@ -137,8 +137,8 @@ def test_sections_of_many_states_agree_with_scipy() -> None:
         atol=1e-13,
         events=surface,
     )
-    np.testing.assert_allclose(found.t[:3], run.t_events[0][:3], atol=1e-8)
-    np.testing.assert_allclose(found.state[:3], run.y_events[0][:3], atol=1e-7)
+    np.testing.assert_allclose(section.t[:3], run.t_events[0][:3], atol=1e-8)
+    np.testing.assert_allclose(section.state[:3], run.y_events[0][:3], atol=1e-7)
 
 
 def test_a_cycle_of_eight_states_has_the_multipliers_of_its_divergence() -> None:

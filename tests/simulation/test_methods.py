@@ -90,11 +90,11 @@ def test_pieces_of_orbits_hand_over_too() -> None:
     from udd import _core
 
     for x in (1e-12, 1e-6, 0.1):
-        found = _core.shoot(
+        pieces = _core.shoot(
             POLE, np.zeros((1, 0)), np.array([[x, 0.3]]), np.zeros(1), np.full(1, 0.05), [], 1e-12, 1e-14
         )
-        np.testing.assert_allclose(found["x"][0, 0], np.sqrt(x**2 + 0.1), rtol=1e-8)
-        np.testing.assert_allclose(found["by_state"][0, 0, 0], x / np.sqrt(x**2 + 0.1), rtol=1e-6)
+        np.testing.assert_allclose(pieces["x"][0, 0], np.sqrt(x**2 + 0.1), rtol=1e-8)
+        np.testing.assert_allclose(pieces["by_state"][0, 0, 0], x / np.sqrt(x**2 + 0.1), rtol=1e-6)
 
 
 @contextmanager

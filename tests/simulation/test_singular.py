@@ -52,14 +52,14 @@ def test_an_alternative_whose_name_the_model_has_is_told_apart():
 
 
 def test_curves_that_cannot_be_told_from_the_parameters_are_a_case(monkeypatch):
-    found = discovered.nothing()
-    curve = scan_curves(found.baseline).curves[0]
+    discovery = discovered.nothing()
+    curve = scan_curves(discovery.baseline).curves[0]
 
     def singular(*_):
         raise np.linalg.LinAlgError("the leading minor is not positive definite")
 
     monkeypatch.setattr(absorbing, "eigh", singular)
-    theirs = absorbing.confounded_directions(curve, found.baseline)
+    theirs = absorbing.confounded_directions(curve, discovery.baseline)
     np.testing.assert_array_equal(theirs.left(curve.covariance), curve.covariance)
 
 

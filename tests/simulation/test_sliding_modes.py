@@ -80,7 +80,7 @@ def test_derivatives_pass_through_sticking_and_slipping() -> None:
     kinds = list(run.events.kind)
     assert kinds.count("stick") == kinds.count("slip") == 3
     by, start = 1e-6, np.array([1.0, -0.1])
-    found = _core.shoot(
+    pieces = _core.shoot(
         model, np.array([[0.5, 0.7]]), start[None], np.zeros(1), np.full(1, 12.0), [0, 1], 1e-12, 1e-14
     )
 
@@ -91,7 +91,7 @@ def test_derivatives_pass_through_sticking_and_slipping() -> None:
 
     apart = [(end(0.5 + by, 0.7) - end(0.5 - by, 0.7)), (end(0.5, 0.7 + by) - end(0.5, 0.7 - by))]
     # Central differences of runs to 1e-13 over 2e-6.
-    np.testing.assert_allclose(found["by_parameter"][0], np.transpose(apart) / (2 * by), atol=3e-6)
+    np.testing.assert_allclose(pieces["by_parameter"][0], np.transpose(apart) / (2 * by), atol=3e-6)
 
 
 def test_friction_that_another_jump_changes() -> None:

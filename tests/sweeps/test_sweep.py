@@ -30,30 +30,30 @@ def named(found: Any) -> dict[int, str]:
 
 def test_exponents_are_those_of_lyapunov_to_the_last_bit() -> None:
     spec = exponents_spec(n=9)
-    found = udd.sweep(spec)
+    result = udd.sweep(spec)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", udd.ConvergenceWarning)
         values, errors = udd.lyapunov(spec.axes["w"], t=2000.0, tol=1e-9, with_error=True)
-    assert found["value"].values.tobytes() == values.tobytes()
-    assert found["standard_error"].values.tobytes() == errors.tobytes()
-    assert not found["converged"].any()
-    assert (found["outcome"] == 0).all()
-    assert found["value"].dims == ("w",)
-    assert udd.SweepSpec.from_json(found.attrs["spec"]) == spec
-    assert found.attrs["spec_sha256"] == spec.sha256
+    assert result["value"].values.tobytes() == values.tobytes()
+    assert result["standard_error"].values.tobytes() == errors.tobytes()
+    assert not result["converged"].any()
+    assert (result["outcome"] == 0).all()
+    assert result["value"].dims == ("w",)
+    assert udd.SweepSpec.from_json(result.attrs["spec"]) == spec
+    assert result.attrs["spec_sha256"] == spec.sha256
 
 
 def test_final_states_are_those_of_simulate_to_the_last_bit() -> None:
     spec = disk_spec()
-    found = udd.sweep(spec)
-    assert found["outcome"].dims == ("W", "relaxation.b", "Z")
-    assert (found["W"].attrs["units"], found["relaxation.b"].attrs["units"]) == ("m/s", "1/m")
-    assert (found["Z"].attrs["units"], found["final_Omega"].attrs["units"]) == ("m", "rad/s")
-    names = named(found)
+    result = udd.sweep(spec)
+    assert result["outcome"].dims == ("W", "relaxation.b", "Z")
+    assert (result["W"].attrs["units"], result["relaxation.b"].attrs["units"]) == ("m/s", "1/m")
+    assert (result["Z"].attrs["units"], result["final_Omega"].attrs["units"]) == ("m", "rad/s")
+    names = named(result)
     seen = set()
     for index in np.ndindex(spec.shape):
         W, b, Z = (float(values[k]) for values, k in zip(spec.axes.values(), index, strict=True))
-        here = found.isel(dict(zip(found["outcome"].dims, index, strict=True)))
+        here = result.isel(dict(zip(result["outcome"].dims, index, strict=True)))
         outcome = names[int(here["outcome"])]
         seen.add(outcome)
         model = DISK.with_parameters({"W": W, "relaxation.b": b})
@@ -71,11 +71,11 @@ def test_a_failed_trajectory_is_an_outcome_and_disturbs_no_other() -> None:
     # At 3.9 cm/s the disk leaves the wheels, at 7.1 cm/s from here it does not.
     over = {"W": [0.039, 0.071]}
     options = {"t": 2000.0, "tol": 1e-9}
-    found = udd.sweep(udd.SweepSpec("lyapunov", udd.Disk(0.039), over, options=options))
-    assert [named(found)[k] for k in found["outcome"].values] == ["ejected", "finished"]
-    assert np.isnan(found["value"].values).tolist() == [True, False]
+    result = udd.sweep(udd.SweepSpec("lyapunov", udd.Disk(0.039), over, options=options))
+    assert [named(result)[k] for k in result["outcome"].values] == ["ejected", "finished"]
+    assert np.isnan(result["value"].values).tolist() == [True, False]
     with pytest.warns(udd.ConvergenceWarning):
-        assert udd.lyapunov(udd.Disk(0.071), t=2000.0, tol=1e-9) == found["value"].values[1]
+        assert udd.lyapunov(udd.Disk(0.071), t=2000.0, tol=1e-9) == result["value"].values[1]
 
 
 def test_a_solution_that_blows_up_is_an_outcome() -> None:
@@ -89,38 +89,38 @@ def test_a_solution_that_blows_up_is_an_outcome() -> None:
 
 def test_a_disk_that_is_nowhere_on_the_wheels_is_not_run() -> None:
     spec = udd.SweepSpec("final_state", DISK, {"Z": [0.08, 0.09, -0.1]}, [0.0, 0.01, 0.0, 0.0], {"t": 1.0})
-    found = udd.sweep(spec)
-    assert [named(found)[k] for k in found["outcome"].values] == ["ejected"] * 3
-    assert found["t_end"].values.tolist() == [0.0] * 3
-    assert found["final_Z"].values.tolist() == [0.08, 0.09, -0.1]
-    assert found["final_Y"].values.tolist() == [0.01] * 3
+    result = udd.sweep(spec)
+    assert [named(result)[k] for k in result["outcome"].values] == ["ejected"] * 3
+    assert result["t_end"].values.tolist() == [0.0] * 3
+    assert result["final_Z"].values.tolist() == [0.08, 0.09, -0.1]
+    assert result["final_Y"].values.tolist() == [0.01] * 3
 
 
 @pytest.mark.parametrize("treatment", ["set-valued", "karnopp", "lugre"])
 def test_runs_keep_their_friction(treatment: str) -> None:
     """Modes and bristles are left to Runge-Kutta methods, which know them."""
     rod = udd.Pendulum(0.5, k0=0.01).with_effects(udd.effects.coulomb(c=0.3, treatment=treatment))
-    found = udd.sweep(udd.SweepSpec("final_state", rod, {"theta": [0.2, 1.0, 2.0]}, options={"t": 9.0}))
-    for k, theta in enumerate(found["theta"].values.tolist()):
+    result = udd.sweep(udd.SweepSpec("final_state", rod, {"theta": [0.2, 1.0, 2.0]}, options={"t": 9.0}))
+    for k, theta in enumerate(result["theta"].values.tolist()):
         start = [0.0, theta, 0.0][: len(rod.state_names)]
         run = udd.simulate(rod, [0.0, 9.0], start, method="auto")
-        ends = [float(found[f"final_{name}"].values[k]) for name in rod.state_names]
+        ends = [float(result[f"final_{name}"].values[k]) for name in rod.state_names]
         assert ends == run.state[-1].tolist()
     # Held, or as good as with bristles.
-    assert np.abs(found["final_Omega"].values).min() < 1e-3
+    assert np.abs(result["final_Omega"].values).min() < 1e-3
 
 
 def test_exponents_over_two_parameters_and_a_state() -> None:
     over = {"z": [0.01, -1.0], "B": [0.0, 0.2], "w": [1.0, 2.0, 3.0]}
     spec = udd.SweepSpec("lyapunov", udd.DLE(1.0), over, options={"t": 500.0, "tol": 1e-9})
-    found = udd.sweep(spec)
+    result = udd.sweep(spec)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", udd.ConvergenceWarning)
         # B = 0 alone, without the terms that it switches off, and beside others: the same bits.
         for index in np.ndindex(spec.shape):
             z, b, w = (float(values[k]) for values, k in zip(spec.axes.values(), index, strict=True))
             alone = udd.lyapunov(udd.DLE(w, b), t=500.0, tol=1e-9, state0=[1.0, 1.0, z])
-            assert found["value"].values[index] == alone
+            assert result["value"].values[index] == alone
 
 
 def test_spectra_add_up_to_the_divergence() -> None:

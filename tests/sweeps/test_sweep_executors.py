@@ -230,11 +230,11 @@ def test_a_chunk_that_kills_every_worker_is_given_up_and_the_rest_kept() -> None
         r"1 of 12 chunks are not finished: chunk 3 failed 3 times \(the worker is gone\); the others are kept"
     )
     with Sickly({3: 99}) as workers, pytest.warns(IncompleteWarning, match=said):
-        found = udd.sweep(spec, workers)
-    missing = (found["outcome"] == -1).values
+        result = udd.sweep(spec, workers)
+    missing = (result["outcome"] == -1).values
     assert missing.sum() == 6
-    assert np.isnan(found["final_Y"].values[missing]).all()
-    assert found["final_Y"].values[~missing].tobytes() == whole["final_Y"].values[~missing].tobytes()
+    assert np.isnan(result["final_Y"].values[missing]).all()
+    assert result["final_Y"].values[~missing].tobytes() == whole["final_Y"].values[~missing].tobytes()
 
 
 def test_a_mistake_in_the_work_is_not_taken_for_a_death() -> None:
@@ -257,12 +257,12 @@ def test_a_pool_that_breaks_ends_the_sweep_and_another_goes_on(tmp_path: Path, w
     killer = threading.Thread(target=kill)
     killer.start()
     with pytest.warns(IncompleteWarning, match=r"the executor takes no more work .*the same call goes on"):
-        found = udd.sweep(spec, pool, store)
+        result = udd.sweep(spec, pool, store)
     killer.join()
     with pytest.raises(BrokenProcessPool):
         pool.submit(int)
     pool.shutdown()
-    assert 0 < (found["outcome"] == 0).sum() < 50
+    assert 0 < (result["outcome"] == 0).sum() < 50
     with spawned() as fresh:
         udd.sweep(spec, fresh, store)
     assert files(store) == whole(spec)[1]
@@ -299,12 +299,12 @@ def test_a_dask_worker_killed_in_the_middle(failures: int, tmp_path: Path, whole
         killer = threading.Thread(target=kill)
         killer.start()
         counted = Counted(workers)
-        found = udd.sweep(spec, counted, store)
+        result = udd.sweep(spec, counted, store)
         killer.join()
     assert killed[0] < 30
     assert counted.count == 30 if failures else counted.count > 30
     alone, bytes_of = whole(spec)
-    assert found.identical(alone)
+    assert result.identical(alone)
     assert files(store) == bytes_of
 
 

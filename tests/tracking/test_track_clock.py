@@ -55,12 +55,12 @@ def test_inserted_copies_delay_a_film_and_replacing_ones_do_not(tmp_path: Path):
     replaced = [k - 1 if k in copied else k for k in range(150)]
     for shown in (inserted, replaced):
         film(tmp_path / "swing.mp4", theta[shown], 30)
-        found = udd.track(tmp_path / "swing.mp4", bob="red", length=0.8)
-        assert sum(flag.startswith("dup") for flag in found.flag) == 4
-        assert np.abs(found.t - np.array(shown) / 30)[found.seen].max() < 1e-9
-        delays = sum("delays" in flag for flag in found.flag)
+        measurement = udd.track(tmp_path / "swing.mp4", bob="red", length=0.8)
+        assert sum(flag.startswith("dup") for flag in measurement.flag) == 4
+        assert np.abs(measurement.t - np.array(shown) / 30)[measurement.seen].max() < 1e-9
+        delays = sum("delays" in flag for flag in measurement.flag)
         assert delays == (4 if shown is inserted else 0)
-        assert not udd.fit(found, udd.Pendulum(0.8)).doubts.missing
+        assert not udd.fit(measurement, udd.Pendulum(0.8)).doubts.missing
 
 
 @pytest.mark.parametrize("seed", range(6))

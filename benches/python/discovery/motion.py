@@ -131,7 +131,7 @@ def run(world: World, start: Sequence[float], duration: float) -> Run | None:
     # A drawn law may push without bound: the solver then took ever smaller steps, and kept all of them.
     edge.terminal = spinning.terminal = True  # type: ignore[attr-defined]
     begin = [world.momentum(0.0, start), *start[1:]]
-    found = solve_ivp(
+    solution = solve_ivp(
         lambda t, s: world.rates(t, s.tolist()),
         (-0.1, duration + 0.1),
         begin,
@@ -142,7 +142,7 @@ def run(world: World, start: Sequence[float], duration: float) -> Run | None:
         events=(edge, spinning),
         dense_output=True,
     )
-    return Run(world, found.sol) if found.status == 0 else None
+    return Run(world, solution.sol) if solution.status == 0 else None
 
 
 def staying(world: World, duration: float, rng: np.random.Generator, tries: int = 20) -> Run | None:

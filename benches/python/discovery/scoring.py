@@ -79,11 +79,11 @@ def _sense(result: Score, case: Case, seed: int, duration: float) -> None:
     """A record of a sensor with a fault, whose model lacks nothing."""
     measured, known = sensed(case.names[0], case.defect, duration, case.generator(seed))
     begin = time.process_time()
-    found = udd.discover(measured, known)
+    discovery = udd.discover(measured, known)
     result.seconds = time.process_time() - begin
     result.W = float(known.parameters.get("W", 0.0))
-    _say(result, found)
-    result.false = len(found.effects)
+    _say(result, discovery)
+    result.false = len(discovery.effects)
 
 
 def _say(result: Score, found: udd.Discovery) -> None:

@@ -114,7 +114,7 @@ def _cart(length: float, shake: Motion | None, rng: np.random.Generator) -> tupl
 
 
 def _solved(rates: Callable[[float, np.ndarray], list[float]], start: list[float], length: float) -> Motion:
-    found = solve_ivp(
+    solution = solve_ivp(
         rates,
         (-0.1, length + 0.1),
         start,
@@ -124,7 +124,7 @@ def _solved(rates: Callable[[float, np.ndarray], list[float]], start: list[float
         max_step=0.05,
         dense_output=True,
     )
-    return lambda t: found.sol(t)[:1].T
+    return lambda t: solution.sol(t)[:1].T
 
 
 def _slow(motion: Motion, t: np.ndarray, length: float, constant: float) -> np.ndarray:

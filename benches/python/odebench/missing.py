@@ -118,13 +118,13 @@ def search(record: Record, noise: float) -> Missing:
     begin = time.process_time()
     # A fit of what was not seen has to begin somewhere.
     hidden = {s: x for s, x in zip(system.states, system.starts[0], strict=True) if s not in record.seen}
-    found = udd.discover(
+    discovery = udd.discover(
         udd.Measurement(record.t, record.columns, sigma=record.sigma),
         model,
         state0=hidden or None,
     )
     result.seconds = time.process_time() - begin
-    _judge(result, record, model, found, truth)
+    _judge(result, record, model, discovery, truth)
     return result
 
 

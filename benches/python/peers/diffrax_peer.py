@@ -35,7 +35,7 @@ def disk_rates(t: Any, y: Any, _: Any) -> Any:
 
 def solved(rates: Any, start: Any, t: Any, w: Any, rtol: float, atol: float, **more: Any) -> Any:
     """The solution's last state."""
-    found = dfx.diffeqsolve(
+    solution = dfx.diffeqsolve(
         dfx.ODETerm(rates),
         dfx.Dopri8(scan_kind="bounded"),
         0.0,
@@ -49,7 +49,7 @@ def solved(rates: Any, start: Any, t: Any, w: Any, rtol: float, atol: float, **m
         throw=False,
         **more,
     )
-    return jax.tree.map(lambda a: a[-1], found.ys)
+    return jax.tree.map(lambda a: a[-1], solution.ys)
 
 
 def final(rtol: float, atol: float) -> Any:
