@@ -35,16 +35,16 @@ def row(what: str, value: float, known: Decimal, bound: float) -> float:
 
 def periods() -> list[float]:
     """Compare periods of the symmetric cycle of the DLE."""
-    found = []
+    rows = []
     for w in (7.1, 7.5, 8.0, 9.0, 10.0, 12.0, 15.0, 20.0, 30.0, 50.0, 70.0, 100.0):
         orbit = udd.periodic_orbit(udd.DLE(w))
-        found.append(row(f"period at w = {w:g}", orbit.period, symmetric_period(orbit), orbit.period_error))
-    return found
+        rows.append(row(f"period at w = {w:g}", orbit.period, symmetric_period(orbit), orbit.period_error))
+    return rows
 
 
 def hopf_points() -> list[float]:
     """Compare Hopf points of the damped equations: w = (1 - B)/(B (1 + B)), frequency sqrt((1 - B)/B)."""
-    found = []
+    rows = []
     for B in (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9):
         b = Fraction(B)
         exact = (1 - b) / (b * (1 + b))
@@ -52,16 +52,16 @@ def hopf_points() -> list[float]:
         start = next(rest for rest in rests if rest.state[0] > 1e-3)
         (hopf,) = udd.continuation(start, "w", (0.5 * float(exact), 2.0 * float(exact))).points
         known = Decimal(exact.numerator) / Decimal(exact.denominator)
-        found.append(row(f"Hopf point at B = {B:g}", hopf.value, known, hopf.error))
+        rows.append(row(f"Hopf point at B = {B:g}", hopf.value, known, hopf.error))
         squared = (1 - b) / b
         turn = 2 * PI / (Decimal(squared.numerator) / Decimal(squared.denominator)).sqrt()
-        found.append(row(f"its period at B = {B:g}", hopf.period, turn, hopf.period_error))
-    return found
+        rows.append(row(f"its period at B = {B:g}", hopf.period, turn, hopf.period_error))
+    return rows
 
 
 def special_points() -> list[float]:
     """Compare points of codimension two: cusps, Bogdanov-Takens and Bautin points with closed forms."""
-    found = []
+    rows = []
     for p2 in (10.0, 12.0, 14.0, 18.0, 20.0):
         # A -> B in a stirred reactor: v = 2 and u = 1/2 at the cusp.
         texts = ["-u + p1*(1 - u)*exp(v)", f"-v + p1*{p2}*(1 - u)*exp(v) - p3*v"]
@@ -72,7 +72,7 @@ def special_points() -> list[float]:
         (cusp,) = (point for point in curve.points if point.kind == "cusp")
         known = Decimal(-2).exp(), Decimal(p2) / 4 - 1
         for k, name in enumerate(cusp.parameters):
-            found.append(row(f"{name} of the cusp at p2 = {p2:g}", cusp.values[k], known[k], cusp.errors[k]))
+            rows.append(row(f"{name} of the cusp at p2 = {p2:g}", cusp.values[k], known[k], cusp.errors[k]))
     c, d = 0.3, 0.7
     plane = udd.Model(["x", "v"], ["v", f"x^2 - (m - {d}) + v*(b - {c} + x)"], {"b": 1.1, "m": 1.7})
     rest = min(udd.equilibria(plane), key=lambda one: float(one.state[0]))
@@ -86,31 +86,31 @@ def special_points() -> list[float]:
     for point in (takens, bautin):
         for k, name in enumerate(point.parameters):
             at = Decimal((c, d)[k])
-            found.append(row(f"{name} of the {point.kind} point", point.values[k], at, point.errors[k]))
+            rows.append(row(f"{name} of the {point.kind} point", point.values[k], at, point.errors[k]))
     for name, value in takens.coefficients.items():
         bound = takens.coefficient_errors[name]
-        found.append(row(f"coefficient {name} of the {takens.kind} point", value, Decimal(1), bound))
+        rows.append(row(f"coefficient {name} of the {takens.kind} point", value, Decimal(1), bound))
     known = -2 * Decimal(d)
     bound = bautin.coefficient_errors["l2"]
-    found.append(row("coefficient l2 of the Bautin point", bautin.coefficients["l2"], known, bound))
-    return found
+    rows.append(row("coefficient l2 of the Bautin point", bautin.coefficients["l2"], known, bound))
+    return rows
 
 
 def ends_of_branches() -> list[float]:
     """Compare ends of branches: Hopf points, pitchforks, a fold of cycles, a saddle-node on a circle."""
-    found = []
+    rows = []
     pitchfork, fifth = 0.6, 0.7  # as floats, which the models have
     for A in (0.8, 1.0, 1.3):
         model = udd.Model(["x", "y"], ["A + x^2*y - (b + 1)*x", "b*x - x^2*y"], {"A": A, "b": 1.3 + A * A})
         orbit = udd.periodic_orbit(model, [1.0, 2.0], settle=200.0)
         (hopf,) = udd.continuation(orbit, "b", direction="down").find("Hopf")
         known = 1 + Decimal(A) ** 2
-        found.append(row(f"Hopf point of the Brusselator at A = {A:g}", hopf.value, known, hopf.error))
+        rows.append(row(f"Hopf point of the Brusselator at A = {A:g}", hopf.value, known, hopf.error))
     for r in (0.61, 0.9, 2.0):
         model = udd.Model(["x"], ["(r - 0.6)*x - x^3"], {"r": r})
         side = max(udd.equilibria(model), key=lambda rest: float(rest.state[0]))
         (point,) = udd.continuation(side, "r", (0.0, 3.0), direction="down").points
-        found.append(row(f"pitchfork from r = {r:g}", point.value, Decimal(pitchfork), point.error))
+        rows.append(row(f"pitchfork from r = {r:g}", point.value, Decimal(pitchfork), point.error))
     square = "(x^2 + y^2)"
     for a in (0.4, 0.9):
         radial = f"(mu + {a}*{square} - 0.7*{square}^2)"
@@ -118,57 +118,57 @@ def ends_of_branches() -> list[float]:
         orbit = udd.periodic_orbit(wheel, [1.0, 0.0], settle=100.0)
         fold = udd.continuation(orbit, "mu", (-0.5, 0.5), direction="down").find("fold")[0]
         known = -(Decimal(a) ** 2) / (4 * Decimal(fifth))
-        found.append(row(f"fold of cycles at a = {a:g}", fold.value, known, fold.error))
-        found.append(row(f"its period at a = {a:g}", fold.period, PI, fold.period_error))
+        rows.append(row(f"fold of cycles at a = {a:g}", fold.value, known, fold.error))
+        rows.append(row(f"its period at a = {a:g}", fold.period, PI, fold.period_error))
     radial = "(1 - x^2 - y^2)"
     circle = udd.Model(["x", "y"], [f"x*{radial} - y*(3*m + x)", f"y*{radial} + x*(3*m + x)"], {"m": 0.5})
     orbit = udd.periodic_orbit(circle, [1.0, 0.0])
     snic = udd.connection(udd.continuation(orbit, "m", (0.1, 1.0), direction="down", max_period=200.0))
-    found.append(row("saddle-node on a circle", snic.value, Decimal(1) / 3, snic.error))
-    return found
+    rows.append(row("saddle-node on a circle", snic.value, Decimal(1) / 3, snic.error))
+    return rows
 
 
 def numbers_of_solutions() -> list[float]:
     """Compare multipliers and first Lyapunov coefficients."""
-    found = []
+    rows = []
     radial = "(1 - x^2 - y^2)"
     model = udd.Model(["x", "y", "u"], [f"x*{radial} - y", f"y*{radial} + x", "-0.3*u + x*(x^2 + y^2 - 1)"])
     orbit = udd.periodic_orbit(model, [1.0, 0.0, 0.0])
     for rate, value, bound in zip((0.3, 2.0), orbit.multipliers, orbit.multiplier_errors, strict=True):
         known = (-2 * PI * Decimal(rate)).exp()
-        found.append(row(f"multiplier of the rate {rate:g}", float(value.real), known, float(bound)))
+        rows.append(row(f"multiplier of the rate {rate:g}", float(value.real), known, float(bound)))
     for bend in (0.5, 1.0, 3.0):
         model = udd.Model(["x", "y"], ["y", f"-x + mu*y - {bend}*x^2*y"], {"mu": -0.3})
         (hopf,) = udd.continuation(udd.equilibria(model)[0], "mu", (-1.0, 1.0)).find("Hopf")
         known = -Decimal(bend) / 4
         what = f"first Lyapunov coefficient at {bend:g}"
-        found.append(row(what, hopf.lyapunov_coefficient, known, hopf.lyapunov_error))
-    return found
+        rows.append(row(what, hopf.lyapunov_coefficient, known, hopf.lyapunov_error))
+    return rows
 
 
 def homoclinic_orbits() -> list[float]:
     """Compare homoclinic orbits of saddles: of the damped equations, of a jerk equation and of Lorenz's."""
-    found = []
+    rows = []
     for B in (0.15, 0.2, 0.3):
         rests = udd.equilibria(udd.DLE(2.5, B=B))
         start = next(rest for rest in rests if rest.state[0] > 1e-3)
         hopf = udd.continuation(start, "w", (0.5, 30.0)).find("Hopf")[0]
         one = udd.connection(udd.continuation(hopf, max_period=16.0))
         known = returning(one.value, *damped(Decimal(B)))
-        found.append(row(f"homoclinic orbit at B = {B:g}", one.value, known, one.error))
+        rows.append(row(f"homoclinic orbit at B = {B:g}", one.value, known, one.error))
     texts = ["v", "a", f"-a - {_FRICTION}*v + mu*x*(1 - x)"]
     (one,) = udd.connections(udd.Model(["x", "v", "a"], texts, {"mu": 0.7}), "mu", (0.7398, 0.7399), n=2)
-    found.append(row("homoclinic orbit of a jerk", one.value, returning(one.value, *JERK), one.error))
+    rows.append(row("homoclinic orbit of a jerk", one.value, returning(one.value, *JERK), one.error))
     texts = ["10*(y - x)", "r*x - y - x*z", "x*y - 2*z"]
     lorenz = udd.Model(["x", "y", "z"], texts, {"r": 12.0})
     (one,) = udd.connections(lorenz, "r", (8.0, 20.0), n=8)
-    found.append(row("homoclinic orbit of Lorenz", one.value, returning(one.value, *LORENZ), one.error))
-    return found
+    rows.append(row("homoclinic orbit of Lorenz", one.value, returning(one.value, *LORENZ), one.error))
+    return rows
 
 
 def connections_of_closed_form() -> list[float]:
     """The rate H' = y^2 (b - c + k (H - H1)) of the energy H keeps H = H1, an orbit of saddles, at b = c."""
-    found = []
+    rows = []
     for c, k in ((0.3, -1.0), (0.7, -0.5)):
         for kind, pull, energy, start in (
             ("homoclinic", "x - x^2", "y^2/2 - x^2/2 + x^3/3", 1.3),
@@ -182,8 +182,8 @@ def connections_of_closed_form() -> list[float]:
                 one = udd.connection(branch)
                 assert one.kind == kind
                 what = f"{kind} orbit of {len(states)} states at c = {c:g}"
-                found.append(row(what, one.value, Decimal(c), one.error))
-    return found
+                rows.append(row(what, one.value, Decimal(c), one.error))
+    return rows
 
 
 # A model in decimals: a step in time, the saddle's growing direction, and its left eigenvector.

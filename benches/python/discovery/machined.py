@@ -76,27 +76,27 @@ def machine_score(case: MachineCase, seed: int) -> MachineScore:
     return result
 
 
-def _judge(result: MachineScore, found: udd.Discovery, sigma: dict[str, float]) -> None:
-    result.verdict = found.verdict
-    names = [f.effect.name for f in found.effects]
-    result.found = [f.title for f in found.effects]
-    result.alternatives = [a.title for a in found.alternatives]
+def _judge(result: MachineScore, discovery: udd.Discovery, sigma: dict[str, float]) -> None:
+    result.verdict = discovery.verdict
+    names = [f.effect.name for f in discovery.effects]
+    result.found = [f.title for f in discovery.effects]
+    result.alternatives = [a.title for a in discovery.alternatives]
     result.right = _matches(result.lacks, names)
     swapped = [
-        [a.effect.name if a.instead_of == name else name for name in names] for a in found.alternatives
+        [a.effect.name if a.instead_of == name else name for name in names] for a in discovery.alternatives
     ]
     result.in_class = result.right or any(_matches(result.lacks, some) for some in swapped)
-    before, after = found.error_before, found.error_after
+    before, after = discovery.error_before, discovery.error_after
     if before.unit == "rad":
         result.before, result.after, result.floor = before.whole, after.whole, float(after.floor[-1])
     else:
-        k = before.horizons.index(found.horizon)
+        k = before.horizons.index(discovery.horizon)
         result.before, result.after = float(before.median[k]), float(after.median[k])
         result.floor = float(after.floor[k])
-    _value, result.low, result.high = found.ratio
-    fit = found.fit
+    _value, result.low, result.high = discovery.ratio
+    fit = discovery.fit
     result.scatter = float(fit.scatter)
-    told = [one.frame_noise / sigma[one.name] for one in found.noise if one.name in sigma]
+    told = [one.frame_noise / sigma[one.name] for one in discovery.noise if one.name in sigma]
     result.noise = float(np.median(told))
 
 

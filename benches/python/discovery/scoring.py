@@ -99,17 +99,17 @@ def _say(result: Score, found: udd.Discovery) -> None:
     result.floor = after.floor.tolist()
 
 
-def _judge(result: Score, drawn: Record, found: udd.Discovery) -> None:
-    _say(result, found)
-    named = [f.effect for f in found.effects] + [a.effect for a in found.alternatives]
+def _judge(result: Score, drawn: Record, discovery: udd.Discovery) -> None:
+    _say(result, discovery)
+    named = [f.effect for f in discovery.effects] + [a.effect for a in discovery.alternatives]
     entered = {_EQUATIONS[slot] for effect in named for slot in effect.slots}
     laws = drawn.world.laws
     result.equations = [bool(set(law.kind.equations) & entered) for law in laws]
-    same = [{law.kind.name} | _otherwise(found, law) for law in laws]
+    same = [{law.kind.name} | _otherwise(discovery, law) for law in laws]
     result.forms = [bool(own & {e.name for e in named}) for own in same]
     result.named = [bool(own & set(result.found)) for own in same]
-    result.false = len(_unexplained(found, set().union(*same)))
-    _measure(result, drawn, found)
+    result.false = len(_unexplained(discovery, set().union(*same)))
+    _measure(result, drawn, discovery)
     best = oracle(drawn)
     result.oracle_error = [best[h] for h in result.horizons]
 
@@ -134,21 +134,21 @@ def _unexplained(found: udd.Discovery, true: set[str]) -> list[str]:
     return left
 
 
-def _measure(result: Score, drawn: Record, found: udd.Discovery) -> None:
+def _measure(result: Score, drawn: Record, discovery: udd.Discovery) -> None:
     """Coefficients over their standard errors, and the device's constants where the form is the truth's."""
     missed = False
     for law in drawn.world.laws:
-        matching = [one for one in found.effects if _same(one.effect, law)]
+        matching = [one for one in discovery.effects if _same(one.effect, law)]
         missed = missed or not matching
         for one in matching:
             for name, value in zip(law.kind.amplitudes, law.amplitudes, strict=True):
                 error = one.errors.get(name, np.nan)
                 result.z[f"{law.kind.name}.{name}"] = float((one.parameters[name] - value) / error)
-    if missed or len(found.effects) != len(drawn.world.laws):
+    if missed or len(discovery.effects) != len(drawn.world.laws):
         return
     for name in _DEVICE:
-        off = found.fit.parameters[name] - getattr(drawn.world.device, name)
-        result.z_device[name] = float(off / found.fit.errors[name])
+        off = discovery.fit.parameters[name] - getattr(drawn.world.device, name)
+        result.z_device[name] = float(off / discovery.fit.errors[name])
 
 
 def _same(effect: udd.effects.Effect, law: Law) -> bool:

@@ -145,35 +145,34 @@ def _factor(added: np.ndarray, truth: np.ndarray) -> float:
 
 
 def _judge(
-    result: Missing, record: Record, model: udd.Model, found: udd.Discovery, truth: np.ndarray
+    result: Missing, record: Record, model: udd.Model, discovery: udd.Discovery, truth: np.ndarray
 ) -> None:
     points = record.points()
-    result.verdict = found.verdict
-    result.scatter = float(found.fit.scatter)
-    result.found = [f"{f.equation} | {f.expression}" for f in found.effects]
-    result.alternatives = [f"{a.instead_of}: {a.title}" for a in found.alternatives]
+    result.verdict = discovery.verdict
+    result.scatter = float(discovery.fit.scatter)
+    result.found = [f"{f.equation} | {f.expression}" for f in discovery.effects]
+    result.alternatives = [f"{a.instead_of}: {a.title}" for a in discovery.alternatives]
     result.listed = any(
         np.isfinite(_factor(_unit(model, one.candidate.effect, points), truth))
-        for one in (found.scans[0] if found.scans else [])
+        for one in (discovery.scans[0] if discovery.scans else [])
         if not one.candidate.effect.spec.shaped
     )
-    factor = (
-        _factor(_added(model, [f.effect for f in found.effects], points), truth) if found.effects else np.nan
-    )
+    effects = [f.effect for f in discovery.effects]
+    factor = _factor(_added(model, effects, points), truth) if effects else np.nan
     result.off = abs(factor - 1)
-    sure = found.verdict == "effect identified"
-    beside = any(np.isfinite(_factor(_unit(model, a.effect, points), truth)) for a in found.alternatives)
+    sure = discovery.verdict == "effect identified"
+    beside = any(np.isfinite(_factor(_unit(model, a.effect, points), truth)) for a in discovery.alternatives)
     if np.isfinite(factor):
         result.outcome = "recovered" if sure else "unsure"
-    elif found.effects:
+    elif discovery.effects:
         result.outcome = "beside" if beside else "wrong" if sure else "located"
-    elif found.verdict == "nothing missing":
+    elif discovery.verdict == "nothing missing":
         result.outcome = "silent"
     else:
-        result.outcome = "unconfirmed" if "not confirmed" in found.verdict else "located"
-    result.before, result.after = _held_out(found)
-    result.r2_before = record.r2_elsewhere(_rates(found.baseline.model))
-    result.r2_after = record.r2_elsewhere(_rates(found.model))
+        result.outcome = "unconfirmed" if "not confirmed" in discovery.verdict else "located"
+    result.before, result.after = _held_out(discovery)
+    result.r2_before = record.r2_elsewhere(_rates(discovery.baseline.model))
+    result.r2_after = record.r2_elsewhere(_rates(discovery.model))
 
 
 def _unit(model: udd.Model, effect: Any, points: np.ndarray) -> np.ndarray:

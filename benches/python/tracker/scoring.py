@@ -92,7 +92,7 @@ def score(
         np.round(film.t[row] * 25).astype(int),
         [*case.defects.get("black", ()), *case.defects.get("repeated", ())],
     )
-    held = film.held[row] & ~bad
+    visible = film.held[row] & ~bad
     seen = np.isfinite(values).all(axis=1)
     use = seen & film.held[row]
     e = values - truth
@@ -116,7 +116,7 @@ def score(
         z2 = z2[np.flatnonzero(use) > 0]
         cover = math.sqrt(float(np.mean(z2)))
     p = case.percentile
-    lost = 1 - int((use & ~bad).sum()) / int(held.sum())
+    lost = 1 - int((use & ~bad).sum()) / int(visible.sum())
     missing = len(film.t) - len(t)
     lost += max(0, missing) / len(film.t)
     return Score(
