@@ -79,7 +79,9 @@ def test_printed_tags(tmp_path: Path) -> None:
     assert np.all(rms(errors(m, film)) < (0.05, 0.05, 1.0))
     assert set(m.quality["marks"]) <= {0, 4, 8, 12, 16} and set(m.quality["method"]) <= {"fast", "none"}
     overlay(film.path, m, tmp_path / "seen.mp4")
-    assert len(pictures_at(tmp_path / "seen.mp4", [20])) == 1
+    (seen,) = pictures_at(tmp_path / "seen.mp4", [20])
+    # a frame has two rings about each of the 16 corners, the centre and the contact
+    assert len(udd.plot.overlay(seen, pixels(m), 20).lines) == 2 * 16 + 2
 
 
 def test_what_is_said_is_not_looked_for(tmp_path: Path) -> None:

@@ -127,7 +127,8 @@ def _loop(asked: dict[str, Any], tell: Tell) -> dict[str, Any]:
         model = Disk(float(W), R=float(R))
     discovery = discover(measurement, model, progress=lambda text: tell({"say": text}))
     tell({"say": "drawing the report"})
-    report = discovery.report(OUT / "report.html", film=file if film else None, source=file)
+    shown = file if film and measurement.kind != "own" else None
+    report = discovery.report(OUT / "report.html", film=shown, source=file)
     (OUT / "discovery.json").write_text(as_json(discovery.to_dict()), encoding="utf-8")
     from . import report_parts, result
 

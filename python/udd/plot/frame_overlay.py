@@ -52,25 +52,10 @@ def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes
     if np.isfinite(u):
         ax.add_patch(Circle((u, v), pixels.radius, fill=False, edgecolor=_LINE, linewidth=1.8))
         ax.plot(u, v, "+", color=_LINE, markersize=9, markeredgewidth=1.8)
-        for (mu, mv), colour in zip(pixels.marks[frame], MARKS, strict=True):
-            ax.plot(
-                mu,
-                mv,
-                "o",
-                markerfacecolor="none",
-                markeredgecolor="white",
-                markersize=11,
-                markeredgewidth=2.6,
-            )
-            ax.plot(
-                mu,
-                mv,
-                "o",
-                markerfacecolor="none",
-                markeredgecolor=colour,
-                markersize=11,
-                markeredgewidth=1.4,
-            )
+        for (mu, mv), codes in zip(pixels.marks[frame], pixels.colours, strict=True):
+            for colour, width in (("white", 2.6), (np.array(codes) / 255, 1.4)):
+                style = {"markerfacecolor": "none", "markeredgecolor": colour, "markeredgewidth": width}
+                ax.plot(mu, mv, "o", markersize=11, **style)
     ax.plot(*pixels.pivot, "x", color="#ff3df2", markersize=8, markeredgewidth=2)
     ax.set_xlim(-0.5, shown.shape[1] - 0.5)
     ax.set_ylim(shown.shape[0] - 0.5, -0.5)
