@@ -199,7 +199,7 @@ def same_colour(chroma: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(unit @ unit.T > SAME)
 
 
-def laid(body: NDArray[np.complex128], seen: NDArray[np.complex128]) -> tuple[complex, complex]:
+def similarity(body: NDArray[np.complex128], seen: NDArray[np.complex128]) -> tuple[complex, complex]:
     """Fit the centre and the complex factor (size, turn) that map a body's points to observed points."""
     spread = body - body.mean()
     turn = complex(np.vdot(spread, seen - seen.mean()) / np.vdot(spread, spread).real)

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import outside
+from udd.markers.layout import similarity
 from udd.tracking.options import TrackOptions
 
 from .rim import Rim
 
 REACH = 65 / 80  # of the radius: where the marks of the standard disk have their centres
 RIM_EDGE = 0.35  # pixels: how well light and lens let one say where a bright disk ends
-DISAGREES = 5.0  # standard errors between what is said and what is found, beyond which one of them is wrong
-MINOR = 0.1  # share of what is said below which the film alone is named
+DISAGREES = 5.0  # standard errors between a given and a fitted value beyond which one of them is wrong
+MINOR = 0.1  # share of the given value below which the film alone is named
 PLACED = 0.02  # pixels: how well the marks' mean places are known
 BY_HAND = 0.05e-3  # m: how well two marks are glued where the layout says; three and more show it themselves
 UNLIKE = 0.015  # relative difference from the rim's scale at which the marks are not the standard ones
@@ -98,11 +99,9 @@ def _by_marks(places: NDArray[np.complex128], options: TrackOptions) -> Scale:
     layout = options.layout
     reach = layout.reach if not layout.standard else options.mark_distance or REACH * options.disk_radius
     body = layout.unit * reach
-    body = body - body.mean()
-    away = places - places.mean()
-    square = float(np.vdot(body, body).real)
-    factor = complex(np.vdot(body, away)) / square
-    rest = away - factor * body
+    centre, factor = similarity(body, places)
+    rest = places - centre - factor * body
+    square = float((np.abs(body - body.mean()) ** 2).sum())
     # of 2 n coordinates a shift, a turn and a factor take four
     spare = 2 * len(places) - 4
     value = abs(factor)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.markers.layout import SLACK, Layout, laid, same_colour
+from udd.markers.layout import SLACK, Layout, same_colour, similarity
 from udd.video.reader import Picture
 
 from .colour_blobs import LEAST_CHROMA, Blobs, Sight, agreeing, blobs
@@ -94,7 +94,7 @@ def _match(
     z, w, area = np.array(at), np.array(seen), np.array(areas)
     if len(w) < 2 or np.abs(w[:, None] - w[None, :])[~np.eye(len(w), dtype=bool)].min() < 4:
         return None  # one patch for two marks
-    centre, turn = laid(z, w)
+    centre, turn = similarity(z, w)
     side = np.sqrt(area) / abs(turn)
     if side.max() > LARGEST or side.min() < SMALLEST or area.max() > 6 * area.min():
         return None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from udd.calibration_items import Estimate, table
 from udd.errors import outside
-from udd.tracking.calibration.scale import Scale
+from udd.tracking.calibration.scale import DISAGREES, MINOR, Scale
 from udd.tracking.geometry.contact_point import pivot as rolling
 from udd.tracking.geometry.contact_point import support
 from udd.tracking.geometry.lens import Lens, middle_of
@@ -25,8 +25,6 @@ from .pixels_to_metres import Camera
 
 CLOSE_ENOUGH = 6.0  # mm: error of a contact that the support alone shows
 BLOCKS = 20  # stretches of the film whose means are the independent pieces
-MINOR = 0.1  # share of the given place below which the film alone is named
-DISAGREES = 5.0  # standard errors between given and fitted place beyond which one of them is wrong
 
 
 def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOptions) -> Camera:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from udd.calibration_items import Calibrate, Estimate
 from udd.errors import outside
+from udd.markers.layout import similarity
 from udd.tracking.calibration.exposure import Exposure, exposure
 from udd.tracking.calibration.exposure import again as retimed
 from udd.tracking.calibration.rim import SPAN, Rim, outline
@@ -261,12 +262,8 @@ def _contact(in_motion: list[Moving], look: DiskAppearance) -> Contact | None:
 def _in_plane(lens: Lens, sight: Sight, body: NDArray[np.complex128]) -> tuple[complex, float]:
     """Return a sight in the picture as a pose in the plane of the disk."""
     arms = body * sight.reach * np.exp(1j * sight.angle)
-    marks = lens.plane(sight.centre + arms)
-    spread = arms - arms.mean()
-    spin = complex(np.vdot(spread, marks - marks.mean()))
-    turn = float(np.angle(spin))
-    factor = spin / float(np.vdot(spread, spread).real)
-    return complex(marks.mean() - factor * arms.mean()), sight.angle + turn
+    centre, factor = similarity(arms, lens.plane(sight.centre + arms))
+    return centre, sight.angle + float(np.angle(factor))
 
 
 def _centred(look: DiskAppearance, centre: complex, options: TrackOptions) -> DiskAppearance:
@@ -290,7 +287,7 @@ def upward(places: NDArray[np.complex128], options: TrackOptions) -> complex:
         turn = complex(places[first] / body[first])
         return turn / abs(turn)
     if not options.layout.standard:
-        turn = complex(np.vdot(body - body.mean(), places - places.mean()))
+        turn = similarity(body, places)[1]
         return turn / abs(turn)
     turns = places / np.abs(places) / body
     off = np.angle(turns / turns.mean()) * np.abs(places)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.markers.layout import laid
+from udd.markers.layout import similarity
 from udd.markers.tags import dictionary
 from udd.tracking.calibration.exposure import Exposure
 from udd.tracking.calibration.rolling_shutter import Readout
@@ -120,7 +120,7 @@ def follow_tags(
 def _rough(at: Complexes, body: Complexes) -> tuple[Pose, float]:
     """Fit the body through points at any size: pose and size."""
     ok = np.isfinite(at)
-    centre, turn = laid(body[ok], at[ok])
+    centre, turn = similarity(body[ok], at[ok])
     return Pose(centre, float(np.angle(turn))), abs(turn)
 
 
@@ -173,9 +173,8 @@ def _displaced(points: Complexes, places: Complexes) -> Complexes:
     for row, at in zip(off, points, strict=True):
         ok = np.isfinite(at)
         z, w = places[ok], at[ok]
-        turn = complex(np.vdot(z - z.mean(), w - w.mean()))
-        turn /= abs(turn)
-        row[ok] = (w - w.mean()) / turn - (z - z.mean())
+        turn = similarity(z, w)[1]
+        row[ok] = (w - w.mean()) / (turn / abs(turn)) - (z - z.mean())
     moved = np.array([np.nanmedian(x.real) + 1j * np.nanmedian(x.imag) for x in off.T])
     return np.asarray(moved - moved.mean(), dtype=np.complex128)
 
