@@ -46,7 +46,7 @@ LEAST = 0.01  # least error of a point's place [pixels]
 Row = tuple[complex, complex, float, tuple[float, float, float]]  # of one frame: as the fields of the motion
 
 
-def camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
+def measured_camera_motion(film: Film, look_over: Survey) -> CameraMotion | None:
     """Return the motion of the camera; None if it was at rest, or if the background does not show it.
 
     Pictures of the survey decide which points belong to the background, and whether they move at all; only
@@ -86,7 +86,7 @@ class _Seen(NamedTuple):
 
 def steadied(film: Film, look_over: Survey) -> tuple[Survey, CameraMotion | None]:
     """Undo a camera's motion, zoom and steps of exposure, in the survey and in the film from here on."""
-    camera = camera_motion(film, look_over)
+    camera = measured_camera_motion(film, look_over)
     if camera is None:
         return look_over, None
     correct = camera.correction(Correction(full_range=film.full_range))
