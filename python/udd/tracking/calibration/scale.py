@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.errors import outside
-from udd.markers.layout import similarity
 from udd.tracking.options import TrackOptions
 
 from .rim import Rim
@@ -99,9 +98,11 @@ def _by_marks(places: NDArray[np.complex128], options: TrackOptions) -> Scale:
     layout = options.layout
     reach = layout.reach if not layout.standard else options.mark_distance or REACH * options.disk_radius
     body = layout.unit * reach
-    centre, factor = similarity(body, places)
-    rest = places - centre - factor * body
-    square = float((np.abs(body - body.mean()) ** 2).sum())
+    body = body - body.mean()
+    away = places - places.mean()
+    square = float(np.vdot(body, body).real)
+    factor = complex(np.vdot(body, away)) / square
+    rest = away - factor * body
     # of 2 n coordinates a shift, a turn and a factor take four
     spare = 2 * len(places) - 4
     value = abs(factor)

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from udd.markers.layout import similarity
-
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
@@ -178,7 +176,8 @@ def _layout(points: Complexes, body: Complexes) -> Complexes:
     """Return the marks' places on the disk, from the frame that shows them best."""
     best = points[np.argmax(np.isfinite(points).sum(axis=1))]
     seen = np.isfinite(best)
-    return np.asarray(body * abs(similarity(body[seen], best[seen])[1]))
+    part, at = body[seen] - body[seen].mean(), best[seen] - best[seen].mean()
+    return np.asarray(body * abs(np.vdot(part, at)) / np.vdot(part, part).real)
 
 
 def _misfit(points: Complexes, seen: NDArray[np.bool_], places: Complexes) -> Array:

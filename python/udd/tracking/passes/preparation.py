@@ -287,7 +287,7 @@ def upward(places: NDArray[np.complex128], options: TrackOptions) -> complex:
         turn = complex(places[first] / body[first])
         return turn / abs(turn)
     if not options.layout.standard:
-        turn = similarity(body, places)[1]
+        turn = complex(np.vdot(body - body.mean(), places - places.mean()))
         return turn / abs(turn)
     turns = places / np.abs(places) / body
     off = np.angle(turns / turns.mean()) * np.abs(places)

@@ -173,8 +173,9 @@ def _displaced(points: Complexes, places: Complexes) -> Complexes:
     for row, at in zip(off, points, strict=True):
         ok = np.isfinite(at)
         z, w = places[ok], at[ok]
-        turn = similarity(z, w)[1]
-        row[ok] = (w - w.mean()) / (turn / abs(turn)) - (z - z.mean())
+        turn = complex(np.vdot(z - z.mean(), w - w.mean()))
+        turn /= abs(turn)
+        row[ok] = (w - w.mean()) / turn - (z - z.mean())
     moved = np.array([np.nanmedian(x.real) + 1j * np.nanmedian(x.imag) for x in off.T])
     return np.asarray(moved - moved.mean(), dtype=np.complex128)
 
