@@ -182,7 +182,7 @@ def test_a_pendulums_film_is_tracked(client: TestClient, tmp_path: Path) -> None
     for params, words in (
         ({"bob": "red"}, "needs the length"),
         ({"bob": "pink", "length": "0.3"}, "Bob must be"),
-        ({"bob": "red,red", "length": "0.3"}, "two bobs need two colours"),
+        ({"bob": "red,red", "length": "0.3"}, "Bob: two bobs need two colours"),
         ({"config": "radius = 0.1"}, "a config has no 'radius'"),
         ({"config": "no table"}, "is not TOML"),
     ):

@@ -243,15 +243,14 @@ def _track_options(request: Request, given: Mapping[str, Any]) -> dict[str, Any]
     """Return the options of `udd.track` that come with a film: entries of a config file, and the fields."""
     from udd.tracking.calibration.config import read_options
 
-    options: dict[str, Any] = parsed("the layout file", request.query_params.get("config", ""), toml=True)
-    if "R" in given:
-        options["disk_radius"] = given["R"]
+    config: dict[str, Any] = parsed("the layout file", request.query_params.get("config", ""), toml=True)
+    said: dict[str, Any] = {"disk_radius": given.get("R")}
     if bob := request.query_params.get("bob"):
-        options |= {"bob": bob, "length": given.get("length")}
-    checked = read_options(options)
-    if checked.bob is not None and checked.length is None:
+        said |= {"bob": bob, "length": given.get("length")}
+    options = read_options(config, **said)
+    if options.bob is not None and options.length is None:
         raise UddError("A pendulum's film needs the length, in m, from the pivot to the bob.")
-    return options
+    return config | {name: value for name, value in said.items() if value is not None}
 
 
 def _number(request: Request, name: str) -> float | None:

@@ -148,10 +148,9 @@ def read_bob(said: Any) -> Layout:
     TrackError
         No such name, codes outside of 0 to 255, or more than two colours.
     """
+    bobs: Sequence[Any] = said if isinstance(said, Sequence) and len(said) == 2 else [said]
     if isinstance(said, str):
         bobs = _colours_in(said)
-    else:
-        bobs = said if isinstance(said, Sequence) and len(said) == 2 else [said]
     colours = tuple(_colour(each, "bob", NAMED | PALE) for each in bobs)
     if len(colours) > 2:
         raise TrackError(f"bob must be one colour, or those of the upper and the lower bob, not {said!r}")

@@ -54,7 +54,11 @@ def overlay(image: Any, pixels: Any, frame: int, ax: Axes | None = None) -> Axes
         ax.plot(u, v, "+", color=_LINE, markersize=9, markeredgewidth=1.8)
         for (mu, mv), codes in zip(pixels.marks[frame], pixels.colours, strict=True):
             for colour, width in (("white", 2.6), (np.array(codes) / 255, 1.4)):
-                style = {"markerfacecolor": "none", "markeredgecolor": colour, "markeredgewidth": width}
+                style: dict[str, Any] = {
+                    "markerfacecolor": "none",
+                    "markeredgecolor": colour,
+                    "markeredgewidth": width,
+                }
                 ax.plot(mu, mv, "o", markersize=11, **style)
     ax.plot(*pixels.pivot, "x", color="#ff3df2", markersize=8, markeredgewidth=2)
     ax.set_xlim(-0.5, shown.shape[1] - 0.5)

@@ -181,7 +181,7 @@ export class Loop {
     }
     const chosen = this.isFilm || !this.table ? [] : this.columns.chosen;
     if (this.bob) values.bob = this.bob;
-    else if (this.isFilm && $("loop-layout").files[0]) values.config = await $("loop-layout").files[0].text();
+    else if (this.isFilm && $("loop-layout").files[0]) values.config = await $("loop-layout").files[0].slice(0, 16384).text(); // a film by mistake
     if (chosen.length) values.columns = JSON.stringify(chosen);
     await this.begin("film", values, this.file);
   }
