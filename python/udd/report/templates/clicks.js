@@ -238,7 +238,7 @@ export class Clicks {
     const bare = document.createElement("canvas");
     bare.width = this.canvas.width;
     bare.height = this.canvas.height;
-    const c = bare.getContext("2d");
+    const c = bare.getContext("2d", { willReadFrequently: true });
     c.drawImage(this.image, 0, 0);
     this.colour = this.places.bob.map(([u, v]) => {
       const { data } = c.getImageData(Math.round(u * this.zoom) - 2, Math.round(v * this.zoom) - 2, 5, 5);
