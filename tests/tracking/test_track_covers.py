@@ -28,6 +28,7 @@ from udd.tracking.marks.rigid_fit import solve
 from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.pixels_to_metres import Camera
 from udd.tracking.metric.pose_covariance import _belief, covariance
+from udd.tracking.passes.copied_pixels import without_lag
 from udd.tracking.passes.local_motion import to_mid_exposure
 from udd.tracking.passes.tracks import FrameTrack, Tracks, found_in
 from udd.video.reader import Picture, light_of_codes
@@ -247,3 +248,19 @@ def test_an_exposure_is_found_from_a_first_estimate_of_a_third() -> None:
         frames.append((codes, pose, lambda T, r=rate, s=spin: Motion(r * T, s * T)))
     found = again(frames, 0.003, LOOK, np.ones((200, 200), dtype=bool))
     assert found == pytest.approx(0.01, rel=0.03)  # codes are whole numbers, streaks ten pixels
+
+
+def test_pixels_that_a_codec_copies_show_an_earlier_pose() -> None:
+    """A codec refreshes an eighth of the marks in each frame of a slow disk, and once the disk jumps."""
+    tracks, _ = rolled(np.random.default_rng(4), 0.0, 0.0, 0.0)
+    step, n = 3e-4, len(tracks)
+    angle = step * np.arange(n) + np.where(np.arange(n) > n // 2, 1.0, 0.0)
+    slow = replace(tracks, centre=np.full(n, PIVOT), angle=angle - 3.5 * step, copied=np.full(n, 7 / 8))
+    corrected, errors = without_lag(slow, LOOK.reach)
+    settled = np.r_[60 : n // 2 - 1, n // 2 + 60 : n]
+    np.testing.assert_allclose(corrected.angle[settled], angle[settled], atol=0.01 * step)
+    np.testing.assert_allclose(errors[settled, 2], 7 * step / np.sqrt(12), rtol=0.01)
+    assert (np.abs(corrected.angle - slow.angle) < 3.6 * step).all()  # a jump is no lag
+    untouched, errors = without_lag(replace(slow, copied=np.zeros(n)), LOOK.reach)
+    np.testing.assert_array_equal(untouched.angle, slow.angle)
+    assert not errors.any()

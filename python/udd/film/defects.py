@@ -16,6 +16,8 @@ from udd.errors import UddError
 from .camera import Camera
 from .light import Picture
 
+WALKING = 1.2  # m/s
+SKIN, HAIR, SHIRT, STRIPE = (198, 150, 122), (62, 44, 30), (64, 82, 120), (182, 178, 170)
 WOBBLE_PERIOD = 1.3  # s
 FLICKER_PERIOD = 0.37  # s: the beat of lamps on alternating current against the frames
 
@@ -74,6 +76,9 @@ class Defects:
         Times in s from which on the camera takes more light or less, and the factor.
     hands : sequence of (float, float)
         Times in s from which and until which a hand hides the disk.
+    walkers : sequence of (float, float)
+        Times in s at which a person who walks to the right passes the pivot, and the distance of the person
+        from the camera relative to the device's. It is below 1 in front of the device.
     clock : sequence of (float, float)
         Times in s, by the film's own clock, from which on the motion is shown slower than the stamps say, and
         by which factor. It is below 1 where the motion is shown faster.
@@ -123,6 +128,7 @@ class Defects:
     zooms: Sequence[Sequence[float]] = ()
     gains: Sequence[Sequence[float]] = ()
     hands: Sequence[Sequence[float]] = ()
+    walkers: Sequence[Sequence[float]] = ()
     clock: Sequence[Sequence[float]] = ()
     flat: bool = False
     blended: float = 0.0
@@ -146,7 +152,7 @@ class Defects:
             if array(name, getattr(self, name)).shape != shape:
                 raise UddError(f"{name} must be finite numbers of shape {shape}, got {getattr(self, name)!r}")
         for name, width, least in (("bumps", 3, -1e3), ("zooms", 2, 0.2), ("gains", 2, 0.01),
-                                   ("hands", 2, 0.0), ("clock", 2, 0.01)):  # fmt: skip
+                                   ("hands", 2, 0.0), ("walkers", 2, 0.3), ("clock", 2, 0.01)):  # fmt: skip
             given = array(name, getattr(self, name))
             rows = given.reshape(-1, width) if given.size % width == 0 else np.full((1, width), np.nan)
             times = rows[:, 0] if name != "hands" else rows.ravel()
@@ -261,9 +267,30 @@ def hand(picture: Picture, camera: Camera, time: float, defects: Defects) -> Pic
 
     if not any(begin <= time < end for begin, end in defects.hands):
         return picture
-    skin = (198, 150, 122)
-    shapes = [dot(0.01 + 0.05 * k, 0.02 * k, 0.12, skin) for k in range(4)]
+    shapes = [dot(0.01 + 0.05 * k, 0.02 * k, 0.12, SKIN) for k in range(4)]
     return over(paint(shapes, camera, 1.5), picture)
+
+
+def person(camera: Camera, time: float, defects: Defects, behind: bool) -> Picture | None:
+    """Draw the person who passes at a time behind the device or in front of it, as a layer; None if none."""
+    import cv2
+
+    from .scene import blurred, box, dot, paint
+
+    for passing, distance in defects.walkers:
+        gone = WALKING * (time - passing)
+        reach = distance * max(camera.size) / camera.scale + 0.4
+        if (distance > 1) != behind or abs(gone) > reach:
+            continue
+        swing = 0.12 * math.sin(2 * math.pi * time)
+        shapes = [box(-0.2, -1.2, 0.2, 0.3, SHIRT), dot(0.0, 0.45, 0.13, SKIN), dot(0.02, 0.51, 0.13, HAIR)]
+        shapes += [box(-0.2, 0.14 * k, 0.2, 0.14 * k + 0.05, STRIPE) for k in range(-8, 3)]
+        shapes += [box(swing - 0.06, -0.4, swing + 0.06, 0.2, STRIPE), dot(swing, -0.42, 0.06, SKIN)]
+        moved = [((corners + np.array([gone, 0.0])) / distance, colour) for corners, colour in shapes]
+        streak = max(1, round(WALKING * camera.exposure * camera.scale / distance))
+        streaked = cv2.blur(paint(moved, camera, 0.0), (streak, 1), borderType=cv2.BORDER_REPLICATE)
+        return blurred(np.asarray(streaked, dtype=np.float32), 1.2)
+    return None
 
 
 def hung(picture: Picture, camera: Camera, count: int, unit: float) -> Picture:

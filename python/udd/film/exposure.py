@@ -10,7 +10,7 @@ import numpy as np
 from udd.video.resampling import resampled
 
 from .camera import Camera
-from .defects import WOBBLE_PERIOD, Defects, hand, lit, source_of_pixels, view_of
+from .defects import WOBBLE_PERIOD, Defects, hand, lit, person, source_of_pixels, view_of
 from .light import Picture, to_code
 from .motion import Array, Motion
 from .scene import back_shapes, blurred, front_shapes, over, paint
@@ -44,12 +44,14 @@ class Scene:
         self.sprite = disk_sprite(self.radius, FOCUS, offsets, defects.mark_strength, patches)
         back = paint(back_shapes(unit) if support > 0 else [], camera, FOCUS)
         front = paint(front_shapes(unit, support, defects.bars), camera, FOCUS)
+        self.background, self.back = background, back
         self.below = over(back, background)
         self.front, self.clear = _split(front)
         self.shade = _shadow(self.radius)
         self._still = over(front, self.below)
         self.source_pixels = source_of_pixels(camera, defects) if defects.bends else None
-        self.plain = not (defects.bends or defects.lights or defects.moves or len(defects.hands))
+        self.plain = not (defects.bends or defects.lights or defects.moves)
+        self.plain &= not (len(defects.hands) or len(defects.walkers))
         self._codes = to_code(self._still)
         self._picture = np.empty_like(self._codes)
 
@@ -65,16 +67,27 @@ class Scene:
         squeeze = np.cos(self.defects.wobble * np.sin(2 * np.pi * times / WOBBLE_PERIOD))
         centres[:, 0] += (squeeze - 1) * (centres[:, 0] - self.camera.pivot[0])
         low, high = self._window(centres)
-        picture = self._picture
-        np.copyto(picture, self._codes if self.plain else self._still)
+        picture, below = self._picture, self.below
+        passer = person(self.camera, stamp, self.defects, behind=True)
+        if passer is None:
+            np.copyto(picture, self._codes if self.plain else self._still)
+        else:
+            below = over(self.back, over(passer, self.background))
+            np.copyto(picture, self.front + self.clear * below)
         if (high > low).all():
             part = (slice(low[1], high[1]), slice(low[0], high[0]))
-            light = self._disk(times - time, states, centres - low, squeeze, part)
+            light = self._disk(below, times - time, states, centres - low, squeeze, part)
             picture[part] = to_code(light) if self.plain else light
         return picture if self.plain else self._developed(picture, stamp)
 
     def _disk(
-        self, times: Array, states: Array, centres: Array, squeeze: Array, part: tuple[slice, slice]
+        self,
+        below: Picture,
+        times: Array,
+        states: Array,
+        centres: Array,
+        squeeze: Array,
+        part: tuple[slice, slice],
     ) -> Picture:
         """Return the light of the part of the picture that the disk and its shadow may touch."""
         rows = np.arange(part[0].start, part[0].stop)
@@ -92,7 +105,7 @@ class Scene:
             shadow_weights = weights[::every] / np.maximum(weights[::every].sum(axis=0), 1e-6)
         some = some + np.multiply(SHADOW_SHIFT, self.radius)
         shadow = _average(self.shade, COARSE, some, np.zeros(len(some)), shape, shadow_weights)
-        light = self.below[part] * _threefold(1 - shadow)
+        light = below[part] * _threefold(1 - shadow)
         light *= clear
         light += disk
         light *= self.clear[part]
@@ -105,6 +118,8 @@ class Scene:
 
         if len(self.defects.hands):
             light = hand(light, self.camera, time, self.defects)
+        passer = person(self.camera, time, self.defects, behind=False)
+        light = light if passer is None else over(passer, light)
         if self.source_pixels is not None:
             light = np.asarray(
                 cv2.remap(light, *self.source_pixels, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),

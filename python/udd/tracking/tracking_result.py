@@ -21,6 +21,7 @@ from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.pixels_to_metres import Camera, left_the_wheels, metres
 from udd.tracking.metric.pose_covariance import add_shared_errors, covariance
 from udd.tracking.metric.turns import count_turns
+from udd.tracking.passes.copied_pixels import without_lag
 from udd.tracking.passes.first_pass import TrackerState
 from udd.tracking.passes.frame_quality import quality, remarks
 from udd.tracking.passes.local_motion import LocalMotion, interpolation_error, to_mid_exposure
@@ -94,7 +95,8 @@ def to_metres(
         why = lost("the background is not seen, and the camera moves")
         tracks = tracks.without(~moved.is_measured[: len(tracks)], why)
     disk = _upright(film, tracks, state, options, rim, twice, look_over)
-    tracks, camera = disk.tracks, disk.camera
+    camera = disk.camera
+    tracks, late = without_lag(disk.tracks, disk.state.look.reach)
     drive = complex(np.conj(camera.drive)) * camera.scale
     turns = count_turns(tracks.t, tracks.centre, tracks.angle, camera.pivot, drive, disk.state.look.reach)
     tracks = replace(tracks, angle=turns.angle)
@@ -105,6 +107,7 @@ def to_metres(
     centre_sigma = by_hand * camera.scale
     if disk.rim is not None and options.calibrate.layout:
         centre_sigma = disk.rim.centre_sigma
+    disk = replace(disk, shared=[*disk.shared, late])
     if moved is not None and not moved.steady:
         disk = replace(disk, shared=[*disk.shared, *moved.errors(tracks.centre)])
     own_errors = covariance(tracks, disk.state.look) * _separation_noise(film, len(tracks))[:, None, None]
@@ -142,8 +145,7 @@ def to_metres(
 def _separation_noise(film: Film, count: int) -> Array:
     """Return the variance of each frame's errors relative to a coded frame's, (count,).
 
-    The errors of coded frames are independent, so those of separated frames add up. If a disk hardly moves,
-    codecs move all its marks alike, and the agreement of the marks does not show this error.
+    The errors of coded frames are independent, so those of separated frames add up.
     """
     if film.conversion is None:
         return np.ones(count)

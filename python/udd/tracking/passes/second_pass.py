@@ -14,6 +14,7 @@ from udd.tracking.geometry.pose import DiskAppearance, Pose
 from udd.tracking.marks.localization import MISFIT
 from udd.video.reader import Film, Picture
 
+from .copied_pixels import CopiedPixels
 from .first_pass import TrackerState, fit_and_check
 from .frame_loop import NOWHERE, Corrected, Observer, observe
 from .local_motion import LONG, NEAR, WEAK_MARKS, LocalMotion, weak
@@ -43,8 +44,9 @@ def refine(
     each frame if it changes.
     """
     refiner = Refiner(state, first, again, look_at)
-    observe(film, [refiner], tick)
-    return first.with_frames(refiner.better | refiner.best)
+    codec = CopiedPixels(state, first)
+    observe(film, [refiner, codec], tick)
+    return replace(first.with_frames(refiner.better | refiner.best), copied=codec.share)
 
 
 class Refiner(Observer):

@@ -30,6 +30,7 @@ class FrameTrack:
     streak: float  # blur length at the marks [pixels]
     flag: str
     method: str  # "fast" or "refined", empty where the disk was not held
+    copied: float = 0.0  # share of the marks' edges that a codec copied from the frame before
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Tracks:
     streak: Array
     flag: tuple[str, ...]
     method: tuple[str, ...]
+    copied: Array
 
     @classmethod
     def of(cls, frames: Sequence[FrameTrack]) -> Tracks:
