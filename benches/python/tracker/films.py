@@ -36,6 +36,7 @@ class Case:
 GLUED = ((0.0010, -0.0004), (-0.0008, 0.0006), (0.0003, 0.0010), (-0.0006, -0.0009))
 MISSING = (60, 97, 98, 140, 171, 200, 230, 231, 232, 290)
 BESIDE = {"size": (900, 700), "scale": 1750.0, "pivot": (620.0, 330.0)}
+PEOPLE = {"walkers": ((4.0, 2.2), (9.0, 0.6))}  # behind the device, and in front of it
 CASES = (
     Case("clean", (0.02, 0.3, 0.0), {"exposure": 0.002, "support": 0.0}),
     Case("standard", (0.04, 0.5, 0.01)),
@@ -73,6 +74,8 @@ CASES = (
     Case("exposure in steps", (0.05, 0.7, 0.02), {}, {"gains": ((4.0, 0.7), (8.0, 1.0))}),
     Case("upside down", (0.04, 0.5, 0.01), {}, {"turned": 2}),
     Case("hand before the disk", (0.04, 0.5, 0.08), {}, {"hands": ((6.0, 6.6), (9.0, 9.4))}),
+    Case("people walk past", (0.05, 0.7, 0.06), {}, PEOPLE),
+    Case("people walk past, held in the hand", (0.08, 3.0, 0.06), {}, {"shake": 3.0, **PEOPLE}),
     Case("dim", (0.06, 0.8, 0.02), {}, {"gains": ((0.0, 0.12),)}),
     Case("slow in the middle", (0.3, 30.0, 0.02), {"fps": 30.0}, {"clock": ((4.0, 8.0), (10.0, 1.0))}),
     # clocks and converters; MPEG-4 as OpenCV writes it has even stamps
