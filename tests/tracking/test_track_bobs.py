@@ -15,6 +15,9 @@ from bob_films import Colour, arc, clock, swing
 from film_for_tests import FPS, write
 from udd.cli import main
 from udd.errors import TrackError
+from udd.measurement import Measurement
+from udd.tracking.geometry.turns import count_turns_over_the_top
+from udd.tracking.passes.double_pendulum import with_lower_bob
 
 GREY_WALL, WHITE_WALL, WOODEN_WALL = (140, 145, 140), (225, 222, 215), (190, 150, 105)
 
@@ -73,3 +76,30 @@ def test_the_lower_bob_of_a_gentle_double_pendulum_is_refused(tmp_path: Path) ->
     film = write(tmp_path / "gentle.mp4", swing([(*lower, (200, 38, 44))], GREY_WALL))
     with pytest.raises(TrackError, match="the bob's path is no circle"):
         udd.track(film, bob="red")
+
+
+def test_a_lower_bob_at_another_distance_is_not_the_bob() -> None:
+    """A shirt of its colour passed above the pivot, and all later angles were a whole turn off in silence."""
+    t = np.arange(60) / FPS
+    angle = 0.9 * np.sin(5.0 * t)
+    first = 100 * np.exp(0.5j * np.pi) * np.ones(60)
+    second = first + 80 * (np.sin(angle) + 1j * np.cos(angle))
+    second[20:26], second[26] = np.nan, first[0] - 140j
+    column = np.zeros((60, 1))
+    upper = Measurement(t, column, column + 1e-3, None, np.array([""] * 60), {}, ["theta"])
+    m = with_lower_bob(upper, first, second, 500.0, "film")
+    assert not m.seen[20:27].any() and m.flag[26].startswith("lost")
+    good = m.seen
+    np.testing.assert_allclose(m["th2"][good], angle[good], atol=1e-9)
+
+
+def test_whole_turns_in_a_gap_are_in_doubt_only_over_the_top() -> None:
+    t = np.arange(200) / FPS
+    swings, turns = 2.0 * np.sin(4 * t), 6.0 * t
+    gap = slice(100, 140)
+    for angle, doubtful in ((swings, 0), (turns, 1)):
+        wrapped = np.angle(np.exp(1j * angle))
+        wrapped[gap] = np.nan
+        counted = count_turns_over_the_top(t, wrapped)
+        assert len(counted.doubtful) == doubtful
+        np.testing.assert_allclose(counted.angle[140:], angle[140:], atol=1e-9)

@@ -53,12 +53,15 @@ def test_what_the_camera_does_is_undone_and_reported(defects: Any, said: str, tm
     assert red[0] > 2 * red[2] and blue[2] > 1.5 * blue[0]
 
 
-def test_a_steady_camera_is_left_alone(tmp_path: Path) -> None:
-    film = shot(tmp_path / "steady.mp4", defects=Defects(hands=((1.0, 1.6),)))
+@pytest.mark.parametrize("defects", [{"hands": ((1.0, 1.6),)}, {"walkers": ((1.2, 2.2), (2.4, 0.6))}])
+def test_a_steady_camera_is_left_alone(defects: Any, tmp_path: Path) -> None:
+    film = shot(tmp_path / "steady.mp4", defects=Defects(**defects))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         m = udd.track(film.path)
     assert "camera_u" not in m.quality and "camera_moved_px" not in m.meta
+    e = rms(errors(m, film))
+    assert e[0] < 0.05 and e[1] < 0.05 and e[2] < 1 and m.seen.mean() > 0.8
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 1.6])

@@ -25,9 +25,9 @@ from udd.film import Defects
 from udd.film.defects import real_times
 from udd.tracking.geometry.contact_point import pivot
 from udd.tracking.geometry.intervals import usual_interval
+from udd.tracking.geometry.turns import count_turns
 from udd.tracking.metric.apparent_gravity import apparent_gravity
 from udd.tracking.metric.film_clock import _rational, slow_parts
-from udd.tracking.metric.turns import count_turns
 from udd.video.reader import Film, real_time, time_of
 
 SCALE, DRIVE = 875.0, 0.039

@@ -16,11 +16,11 @@ from udd.tracking.correction import applied
 from udd.tracking.detection.camera_motion import CameraMotion
 from udd.tracking.detection.frame_flags import GONE, VAGUE, lost
 from udd.tracking.detection.survey import Survey
+from udd.tracking.geometry.turns import count_turns, in_doubt
 from udd.tracking.metric.calibration_report import camera_of, meta_of
 from udd.tracking.metric.common_errors import common_mode_errors
 from udd.tracking.metric.pixels_to_metres import Camera, left_the_wheels, metres
 from udd.tracking.metric.pose_covariance import add_shared_errors, covariance
-from udd.tracking.metric.turns import count_turns
 from udd.tracking.passes.copied_pixels import without_lag
 from udd.tracking.passes.first_pass import TrackerState
 from udd.tracking.passes.frame_quality import quality, remarks
@@ -130,7 +130,7 @@ def to_metres(
     seen_how |= {name: column[: len(tracks)] for name, column in correct.columns.items()}
     if moved is not None:
         meta |= moved.meta
-    open_questions = [(int(k), "a whole turn may be missing") for k in turns.doubtful[:1]]
+    open_questions = in_doubt(turns)
     if camera.pivot_from == "support":
         open_questions.append((0, "the contact is not determined"))
     tracks = replace(tracks, flag=tuple(remarks(tracks.t, tracks.flag, seen_how, twice, open_questions)))

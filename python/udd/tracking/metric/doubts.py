@@ -57,6 +57,7 @@ def doubts(gravity: ApparentGravity | None, camera: Camera, fps: float, turns: i
             f"it is taken from the support, to about {1e3 * camera.pivot_sigma:.0f} mm: give pivot=(u, v) in "
             "pixels"
         )
+        gravity = None  # its lever is the distance from the contact
     if turns:
         gaps = "a gap" if turns == 1 else f"{turns} gaps"
         sentences.append(

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
+from udd.tracking.geometry.turns import count_turns_over_the_top, in_doubt
 from udd.video.reader import TrackError
 
 NAMES = ("th1", "th2")
+ASTRAY = 8.0  # times the usual scatter of the distance, beyond the bob's radius: something else
 RIGID = 0.03  # of the distance of the bobs by which it may change
 
 
@@ -52,15 +54,17 @@ def with_lower_bob(
             f"{name}: the distance of the bobs changes by {scatter:.1f} of {length:.0f} pixels: are they the "
             "two bobs of one double pendulum, the upper one named first?"
         )
-    theta = np.full(len(second), np.nan)
-    theta[seen] = np.unwrap(np.arctan2(arm[seen].real, arm[seen].imag))
-    values = np.column_stack([upper["theta"], theta])
+    seen &= np.abs(off) < np.sqrt(area / np.pi) + ASTRAY * scatter
+    turns = count_turns_over_the_top(upper.t, np.where(seen, np.arctan2(arm.real, arm.imag), np.nan))
+    values = np.column_stack([upper["theta"], turns.angle])
     sigma = np.column_stack([upper["sigma_theta"], np.where(seen, max(scatter, 0.01) / length, np.nan)])
     values[~seen] = sigma[~seen] = np.nan
     flag = [
-        "lost: a bob is not seen, or partly hidden" if not ok and not said else said
+        said or ("" if ok else "lost: a bob is not seen, or partly hidden, or something else has its colour")
         for ok, said in zip(seen, upper.flag, strict=True)
     ]
+    for first_doubtful, why in in_doubt(turns):
+        flag[first_doubtful:] = [said or f"degraded: {why}" for said in flag[first_doubtful:]]
     meta = {
         **upper.meta,
         "frames_lost": int((~seen).sum()),

@@ -26,10 +26,11 @@ from udd.tracking.detection.camera_motion import CameraMotion
 from udd.tracking.detection.frame_flags import BLACK, BLANK, REPEATED, lost, unread
 from udd.tracking.detection.survey import Survey
 from udd.tracking.geometry.pose import Pose
+from udd.tracking.geometry.turns import count_turns_over_the_top, in_doubt
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
-from .double_pendulum import with_lower_bob
+from .double_pendulum import ASTRAY, with_lower_bob
 from .frame_loop import Corrected, PoseSample, Prediction, Target, follow
 from .frame_quality import remarks
 from .inserted_copies import inserted_copies
@@ -38,7 +39,6 @@ Array = NDArray[np.float64]
 RECENT = 5  # frames
 ROUND = 0.03  # of the radius: a path that is off by more is no circle
 WANDERS = 0.003  # of the radius: nor is one with so different distances in one direction ...
-ASTRAY = 8.0  # times the usual distance from the path, beyond the bob's radius: something else
 PLACED = 0.5  # pixels: a small bob's middle is known no better
 SCATTERS = 4.0  # ... if that is so many times the frames' own scatter
 BENDS = 6  # degree of the polynomial by which lens and tilt change the distance
@@ -279,8 +279,7 @@ def _pendulum(
     at[[text.startswith(REPEATED) for text in flag]] = complex(np.nan, np.nan)
     seen = np.isfinite(at)
     away = at - pivot
-    theta = np.full(len(t), np.nan)
-    theta[seen] = np.unwrap(np.arctan2(away[seen].real, away[seen].imag))
+    turns = count_turns_over_the_top(t, np.arctan2(away.real, away.imag))
     rest = np.abs(away) - radius
     sigma = np.where(seen, spread / radius, np.nan)
     rate = np.abs(np.gradient(np.where(seen, at, np.nan), t))
@@ -328,8 +327,8 @@ def _pendulum(
         ]
     else:
         meta["px_per_m"] = None
-    flag = remarks(t, flag, quality, False)
-    return _checked(film, Measurement(t, theta, sigma, None, np.array(flag), meta, PENDULUM, quality))
+    flag = remarks(t, flag, quality, False, in_doubt(turns))
+    return _checked(film, Measurement(t, turns.angle, sigma, None, np.array(flag), meta, PENDULUM, quality))
 
 
 def _checked(film: Film, m: Measurement) -> Measurement:

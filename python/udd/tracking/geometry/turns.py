@@ -85,6 +85,21 @@ def count_turns(
     return Turns(angle, np.array(doubtful, dtype=np.intp))
 
 
+def count_turns_over_the_top(t: Array, angle: Array) -> Turns:
+    """Find the whole turns of a pendulum from its angles (n,) in -pi to pi; none if it only swings."""
+    whole, seen = angle.copy(), np.isfinite(angle)
+    whole[seen] = np.unwrap(angle[seen])
+    if not (np.abs(whole - angle) > 1).any():
+        return Turns(angle, np.empty(0, np.intp))
+    nowhere = complex(np.nan, np.nan)
+    return count_turns(t, np.full(len(t), nowhere), whole, nowhere, nowhere, 1.0)
+
+
+def in_doubt(turns: Turns) -> list[tuple[int, str]]:
+    """Return the frame from which on the number of turns is in doubt, with the reason; none if it is not."""
+    return [(int(k), "a whole turn may be missing") for k in turns.doubtful[:1]]
+
+
 @dataclass(frozen=True)
 class _Way:
     """A gap: its length, the rates on both sides, the centre before and after."""
