@@ -589,7 +589,7 @@ def test_units_are_told_once(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         (["poincare", "--w", "1", "--out", "run.pdf"], "run.pdf: the name must end in .csv or .txt"),
         (["track", "x.mp4", "--out", "bob.xlsx"], "bob.xlsx: the name must end in .csv or .txt"),
         (["track", "x.mp4", "--page", "bob.pdf"], "bob.pdf: the name must end in .html or .htm"),
-        (["track", "x.mp4", "--bob", "pink"], "--bob must be one of red, orange"),
+        (["track", "x.mp4", "--bob", "pink"], "bob must be one of red, orange"),
     ],
 )
 def test_names_that_promise_another_kind_of_file(

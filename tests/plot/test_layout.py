@@ -45,6 +45,7 @@ def pixels() -> Any:
     return SimpleNamespace(
         centre=np.array([[20.0, 30.0]]),
         marks=np.array([[[20.0, 20.0], [30.0, 30.0], [20.0, 40.0], [10.0, 30.0]]]),
+        colours=[(230, 120, 30), (60, 160, 60), (50, 90, 200), (220, 50, 50)],
         radius=14.0,
         pivot=np.array([25.0, 33.0]),
     )

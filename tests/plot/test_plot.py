@@ -174,6 +174,7 @@ def test_a_frame_with_the_disk_on_it() -> None:
     pixels = SimpleNamespace(
         centre=np.array([[20.0, 30.0], [np.nan, np.nan]]),
         marks=np.array([[[20.0, 20.0], [30.0, 30.0], [20.0, 40.0], [10.0, 30.0]]] * 2),
+        colours=[(230, 120, 30), (60, 160, 60), (50, 90, 200), (220, 50, 50)],
         radius=14.0,
         pivot=np.array([25.0, 33.0]),
     )

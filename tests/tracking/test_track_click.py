@@ -35,7 +35,7 @@ from udd.tracking.calibration.rim import Rim
 from udd.tracking.calibration.scale import scale
 from udd.tracking.detection.survey import survey
 from udd.tracking.manual.circle import circle
-from udd.tracking.manual.patches import CLICK, FOUND, patch
+from udd.tracking.manual.patches import CLICK, REFINED, patch
 from udd.tracking.manual.questions import ClickSession
 from udd.tracking.manual.still_frames import still_frames
 from udd.tracking.manual.window import Window
@@ -110,7 +110,7 @@ def test_a_click_is_refined_to_its_patch(made: Made) -> None:
                 assert unit[0] @ unit[1] > 0.98
     assert refined > 20
     # marks of 16 pixels in colours of half the resolution
-    assert np.sqrt(np.mean(np.square(off)) / 2) < FOUND and max(off) < 4 * FOUND
+    assert np.sqrt(np.mean(np.square(off)) / 2) < REFINED and max(off) < 4 * REFINED
 
 
 def test_what_is_hidden_or_grey_is_not_refined(made: Made) -> None:
