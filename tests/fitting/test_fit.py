@@ -298,3 +298,15 @@ def test_a_looser_fit_whose_shape_leaves_its_range_is_no_candidate(monkeypatch):
 
     monkeypatch.setattr(model_error_schedule, "minimise", leaves)
     assert eased(tight).parameters == tight.parameters
+
+
+def test_a_wrong_model_reaches_its_most_probable_model_error():
+    """The first step from the smallest model error gains 0.01 nats, the last one 800."""
+    t = np.linspace(0, 6, 60)
+    truth = udd.simulate(udd.Model(["x"], ["0.32 - 0.6*x"]), t, [0.14]).x
+    noise = 0.03 * truth * np.random.default_rng(0).standard_normal(len(t))
+    decay = udd.Model(["x"], ["-k*x"], {"k": 0.5})
+    measured = udd.Measurement(t, {"x": truth + noise})
+    tight = fit_record(measured, record_of(measured, decay), decay, search=True)
+    assert tight.problem.has_smallest_model_error
+    assert eased(tight).level == 0 and eased(tight).evidence > tight.evidence + 1000

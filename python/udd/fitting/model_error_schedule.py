@@ -178,17 +178,21 @@ def increase_model_error(fitted: Fit, levels: Sequence[tuple[float, ...]]) -> Fi
 
     A level at which a parameter leaves its range is the end.
     """
+    current = best = fitted
     for diffusion in reversed(levels[: levels.index(fitted.problem.diffusion)]):
-        problem = fitted.problem.with_model_error(diffusion)
+        problem = current.problem.with_model_error(diffusion)
         try:
-            looser = minimise(problem, fitted.point, decrease=ROUGH)
+            looser = minimise(problem, current.point, decrease=ROUGH)
         except SolveError:
             # Without this Stribeck's friction on a shaken support ends a search with an error.
             break
-        if _stands(fitted, looser):
+        # The first steps from a very small model error may gain less than a nat, the next ones thousands.
+        if current.converged and not (problem.likeliest and looser.evidence > current.evidence):
             break
-        fitted = looser
-    return fitted
+        current = looser
+        if not _stands(best, current):
+            best = current
+    return best
 
 
 def _settled(fitted: Fit, levels: Sequence[tuple[float, ...]], steps: int) -> Fit:
