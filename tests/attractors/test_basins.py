@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import udd
+from interrupting import interrupting_progress
 from udd.attractors.basin_statistics import basin_fractions, uncertainty
 from udd.cli import main
 from udd.errors import ModelError, UddError
@@ -221,13 +220,15 @@ def test_bad_input_is_named(grid: dict[str, list[float]], options: dict[str, obj
 
 @pytest.mark.skipif(os.name == "nt", reason="signals to a process of its own")
 def test_ctrl_c_gives_what_is_finished() -> None:
-    timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    try:
-        with pytest.raises(udd.Interrupted, match="stopped by Ctrl-C") as stopped:
-            udd.basins(udd.DLE(9.0), square(3, 300), n=24, transient=2000, threads=1)
-    finally:
-        timer.cancel()
+    with pytest.raises(udd.Interrupted, match="stopped by Ctrl-C") as stopped:
+        udd.basins(
+            udd.DLE(9.0),
+            square(3, 300),
+            n=24,
+            transient=2000,
+            threads=1,
+            progress=interrupting_progress(),
+        )
     found = stopped.value.partial
     names = np.array(found["outcome"].attrs["flag_meanings"].split())[found["outcome"].to_numpy()]
     finished = names == "finished"

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-import threading
+import time
 import warnings
 from collections.abc import Iterator
 from itertools import pairwise
@@ -20,6 +20,7 @@ import pytest
 from numpy.typing import NDArray
 
 import udd
+from interrupting import interrupting_progress
 from udd.attractors.attractor import Attractor, alike
 from udd.attractors.matching import AttractorMatcher, intervals
 from udd.chaos.recurrence import periods, tightness
@@ -345,23 +346,19 @@ def test_without_xarray_one_sentence_says_how_to_get_it(monkeypatch: pytest.Monk
 @pytest.mark.skipif(os.name == "nt", reason="signals to a process of its own")
 @pytest.mark.parametrize("path", ["independent", "both"])
 def test_ctrl_c_gives_what_is_finished(path: str) -> None:
-    timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    try:
-        with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):
-            diagram = udd.bifurcation(
-                udd.DLE(1.0),
-                "w",
-                np.linspace(0.5, 4, 5000),
-                n=20,
-                transient=3000,
-                path=path,  # type: ignore[arg-type]
-                component="y",
-                threads=1,
-                partial=True,
-            )
-    finally:
-        timer.cancel()
+    with pytest.warns(udd.IncompleteWarning, match="stopped by Ctrl-C"):
+        diagram = udd.bifurcation(
+            udd.DLE(1.0),
+            "w",
+            np.linspace(0.5, 4, 5000),
+            n=20,
+            transient=3000,
+            path=path,  # type: ignore[arg-type]
+            component="y",
+            threads=1,
+            partial=True,
+            progress=interrupting_progress(),
+        )
     names = diagram["outcome"].attrs["flag_meanings"].split()
     finished = diagram["outcome"] != names.index("interrupted")
     assert 0 < int(finished.sum()) < finished.size
@@ -430,15 +427,18 @@ def test_the_command_refuses_in_one_sentence(
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_the_command_keeps_what_is_finished_on_ctrl_c(tmp_path: Path) -> None:
     path = tmp_path / "part.nc"
-    argv = f"bifurcation w --from 0.5 --to 4 --n 20000 --points 20 --transient 4000 --out {path} --json"
+    argv = f"-m udd bifurcation w --from 0.5 --to 4 --points 20 --transient 4000 --out {path} --json --n"
+    start = time.monotonic()
+    subprocess.run([sys.executable, *argv.split(), "8"], check=True, capture_output=True)
+    start = time.monotonic() - start
     process = subprocess.Popen(
-        [sys.executable, "-m", "udd", *argv.split()],
+        [sys.executable, *argv.split(), "20000"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
     with pytest.raises(subprocess.TimeoutExpired):
-        process.wait(6)
+        process.wait(2 * start)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=120)
     assert process.returncode == 130, err
