@@ -253,7 +253,7 @@ def _pendulum(
         raise TrackError(
             f"{film.path}: the bob's path is no circle ({off:.1f} pixels off one of {path.radius:.0f}): is "
             "it the lower bob of a double pendulum (then give both colours, the upper one first), or "
-            "are there several of that colour (then say region)?"
+            "does something else of that colour, such as a shirt, move (then say region)?"
         )
     pivot, pivot_sigma, origin = path.centre, path.sigma[0], "circle of the bob"
     if options.pivot is not None:
