@@ -20,7 +20,7 @@ from udd.report.sheet import write_sheet
 def test_a_disk_with_tags_is_tracked(opened: Opened, tmp_path: Path) -> None:
     _, config = write_sheet("tags", tmp_path / "tags.pdf", radius=0.08)
     layout = tomllib.loads(config.read_text(encoding="utf-8"))["layout"]
-    film = shot(tmp_path / "tags.mp4", 0.6, layout=layout, exposure=0.002)
+    film = shot(tmp_path / "tags.mp4", 3.0, layout=layout, exposure=0.002)
     page = opened.go()
     page.click("#to-film")
     assert page.locator("#loop-layout").is_hidden()
