@@ -43,8 +43,8 @@ def build() -> str:
     """Compile the benches and return the path of the program."""
     command = ("cargo", "bench", "--locked", "--package", "udd-benches", "--no-run")
     messages = map(json.loads, output(*command, "--message-format", "json", "--quiet").splitlines())
-    found = [m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "paths"]
-    return str(found[-1])
+    results = [m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "paths"]
+    return str(results[-1])
 
 
 def count(program: str, path: str) -> int:

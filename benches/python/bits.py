@@ -100,8 +100,8 @@ def _chaos() -> Iterator[tuple[str, Callable[[], list[object]]]]:
         model = udd.Disk(0.014, edge="ignore") if name == "disk" else RUNS[name][0]
 
         def spectrum(m: object = model, start: object = RUNS[name][1]) -> list[object]:
-            found = udd.lyapunov_spectrum(m, t=400.0, state0=start)
-            return [found.exponents, found.standard_errors]
+            answer = udd.lyapunov_spectrum(m, t=400.0, state0=start)
+            return [answer.exponents, answer.standard_errors]
 
         yield f"spectrum, {name}", spectrum
     yield "poincare, DLE", lambda: [udd.poincare(udd.DLE(1.0), n=500).state]
@@ -112,13 +112,17 @@ def _chaos() -> Iterator[tuple[str, Callable[[], list[object]]]]:
 
 def _attractors() -> Iterator[tuple[str, Callable[[], list[object]]]]:
     def bifurcation() -> list[object]:
-        found = udd.bifurcation(udd.DLE(1.0), "w", np.linspace(6.5, 8, 24), path="both")
-        return [found[name].values for name in sorted(found.data_vars) if found[name].dtype.kind in "fiu"]
+        diagram = udd.bifurcation(udd.DLE(1.0), "w", np.linspace(6.5, 8, 24), path="both")
+        return [
+            diagram[name].values for name in sorted(diagram.data_vars) if diagram[name].dtype.kind in "fiu"
+        ]
 
     def basins() -> list[object]:
         axis = np.linspace(-4, 4, 16)
-        found = udd.basins(udd.DLE(7.6), {"omega": axis, "z": axis}, state0=[0, 0.5, 0])
-        return [found[name].values for name in sorted(found.data_vars) if found[name].dtype.kind in "fiu"]
+        diagram = udd.basins(udd.DLE(7.6), {"omega": axis, "z": axis}, state0=[0, 0.5, 0])
+        return [
+            diagram[name].values for name in sorted(diagram.data_vars) if diagram[name].dtype.kind in "fiu"
+        ]
 
     def continuation() -> list[object]:
         branch = udd.continuation(udd.periodic_orbit(udd.DLE(10.0)), "w", (6.5, 12.0))
@@ -136,12 +140,12 @@ def _loop() -> Iterator[tuple[str, Callable[[], list[object]]]]:
     table = udd.Measurement(run.t, seen).with_meta(W=0.039, R=0.08)
 
     def fit() -> list[object]:
-        found = udd.fit(table, udd.Disk(0.039))
-        return [np.array([found.parameters[name] for name in sorted(found.parameters)])]
+        answer = udd.fit(table, udd.Disk(0.039))
+        return [np.array([answer.parameters[name] for name in sorted(answer.parameters)])]
 
     def discovery() -> list[object]:
-        found = udd.discover(table, udd.Disk(0.039))
-        return [found.verdict.encode(), *(effect.expression.encode() for effect in found.effects)]
+        answer = udd.discover(table, udd.Disk(0.039))
+        return [answer.verdict.encode(), *(effect.expression.encode() for effect in answer.effects)]
 
     def film() -> list[object]:
         with as_file(files("udd") / "demo" / "sample.mp4") as path:

@@ -49,7 +49,7 @@ def by_solve_bvp() -> None:
     """Continue as a user of SciPy would: collocation by solve_bvp at one value after the other."""
     states, period = first_orbit(200)
     t, guess = np.linspace(0.0, 1.0, 201), np.column_stack([states, states[:, 0]])
-    found = {}
+    results = {}
     start = time.perf_counter()
     values = [*np.arange(10.0, 7.05, -0.1), *np.arange(7.0, 4.95, -0.1)]
     for w in values:
@@ -66,8 +66,8 @@ def by_solve_bvp() -> None:
             guess = np.column_stack([np.roll(guess[:, :-1], -k, axis=1), guess[:, k]])
         made = solve_bvp(law, ends, t, guess, p=[period], tol=1e-9, max_nodes=20000)
         t, guess, period = made.x, made.y, float(made.p[0])
-        found[round(float(w), 3)] = period
-    row("scipy.solve_bvp, tol 1e-9", time.perf_counter() - start, len(values), found[7.1], None)
+        results[round(float(w), 3)] = period
+    row("scipy.solve_bvp, tol 1e-9", time.perf_counter() - start, len(values), results[7.1], None)
 
 
 def by_bice() -> None:
@@ -103,16 +103,16 @@ def by_bice() -> None:
     problem.continuation_stepper.ds = -0.1
     problem.continuation_parameter = (law, "w")
     problem.settings.neigs = 0
-    found, points = {}, 0
+    result, points = {}, 0
     start = time.perf_counter()
     with contextlib.redirect_stdout(io.StringIO()):
         while law.w > 5.0 and points < 400:
             problem.continuation_step()
             points += 1
-            found[law.w] = orbit.T
+            result[law.w] = orbit.T
     seconds = time.perf_counter() - start
-    near = min(found, key=lambda w: abs(w - 7.1))
-    row(f"bice, {n} times (w = {near:.4f})", seconds, points, found[near], None)
+    near = min(result, key=lambda w: abs(w - 7.1))
+    row(f"bice, {n} times (w = {near:.4f})", seconds, points, result[near], None)
 
 
 if __name__ == "__main__":

@@ -69,12 +69,12 @@ def roots(f: Callable[[Floats], Floats], length: float, fastest: float) -> Float
     if at[0] > 0:
         near = np.geomspace(1e-9 * at[0], at[0], 200)[:-1]
         at, values = np.concatenate([near, at]), np.concatenate([f(near), values])
-    found = [
+    result = [
         brentq(lambda s: float(f(np.asarray(s))), a, b, xtol=1e-14)
         for a, b, fa, fb in zip(at[:-1], at[1:], values[:-1], values[1:], strict=True)
         if fa * fb < 0
     ]
-    return np.array(found)
+    return np.array(result)
 
 
 # --- sections
@@ -299,8 +299,8 @@ def _section_faults(case: Case) -> list[str]:
     right = case.times
     assert right is not None
     options = {"state0": case.start, "transient": 0, "direction": "both", "rtol": 1e-12, "atol": 1e-14}
-    found = udd.poincare(case.model, case.section, len(right), t_max=right[-1] + 1e-3, **options)
-    times = found.t
+    result = udd.poincare(case.model, case.section, len(right), t_max=right[-1] + 1e-3, **options)
+    times = result.t
     if len(times) != len(right):
         return [f"poincare: {len(times)} of {len(right)} crossings"]
     off = float(np.abs(times - right).max())
@@ -310,14 +310,14 @@ def _section_faults(case: Case) -> list[str]:
 
 def _switch_faults(case: Case) -> list[str]:
     assert case.end is not None
-    found = {}
+    result = {}
     for method in METHODS:
         run = udd.simulate(case.model, [0.0, case.length], case.start, method=method, rtol=1e-10, atol=1e-12)
-        found[method] = run.state[-1]
+        result[method] = run.state[-1]
     many = udd.ensemble(case.model, [0.0, case.length], [case.start] * 2, rtol=1e-10, atol=1e-12)
-    found["ensemble"] = many.end[1]
+    result["ensemble"] = many.end[1]
     wrong = []
-    for name, end in found.items():
+    for name, end in result.items():
         off = float(np.abs(end - case.end).max())
         if not off < case.error:
             wrong.append(f"{name}: off by {off:.1e}")
@@ -333,11 +333,11 @@ def _work(task: tuple[int, int, int, int, str]) -> tuple[collections.Counter[str
             continue
         tally[case.kind] += 1
         try:
-            found = faults(case)
+            result = faults(case)
         except Exception as error:
-            found = [f"{type(error).__name__}: {error}"]
-        if found:
-            wrong.append(f"{name} {case.kind} ({case.what}; from {case.start}): {'; '.join(found)}")
+            result = [f"{type(error).__name__}: {error}"]
+        if result:
+            wrong.append(f"{name} {case.kind} ({case.what}; from {case.start}): {'; '.join(result)}")
             print(wrong[-1], flush=True)
     return tally, wrong
 

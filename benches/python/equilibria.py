@@ -48,11 +48,11 @@ def dense(table: np.ndarray, random: np.random.Generator) -> list[np.ndarray]:
         x = x[np.isfinite(x).all(axis=1) & (np.abs(x).max(axis=1) < 1e6)]
     step = np.linalg.solve(slopes(table, x), rates(table, x)[:, :, None])[:, :, 0]
     x = x[np.abs(step).max(axis=1) < 1e-9 * (1.0 + np.abs(x).max(axis=1))]
-    found: list[np.ndarray] = []
+    results: list[np.ndarray] = []
     while len(x):
-        found.append(x[0])
+        results.append(x[0])
         x = x[np.abs(x - x[0]).max(axis=1) > 1e-6 * (1.0 + np.abs(x[0]).max())]
-    return found
+    return results
 
 
 def model_of(table: np.ndarray) -> udd.Model:

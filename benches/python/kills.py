@@ -86,8 +86,8 @@ def values(store: Path) -> list[bytes]:
     """The arrays of a sweep's store."""
     import xarray as xr
 
-    found = xr.open_zarr(store, consolidated=False, chunks=None)
-    return [found[name].to_numpy().tobytes() for name in sorted(found.variables)]
+    stored = xr.open_zarr(store, consolidated=False, chunks=None)
+    return [stored[name].to_numpy().tobytes() for name in sorted(stored.variables)]
 
 
 def main() -> int:

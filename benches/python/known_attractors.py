@@ -37,10 +37,10 @@ def endings(case: Case) -> set[str]:
     """The kinds of attractors, and other endings, of starts around that of a case."""
     name = case.model.state_names[0]
     grid = {name: case.start[0] + case.spread[0] * np.array([-1.0, 0.0, 1.0])}
-    found = udd.basins(case.model, grid, state0=case.start, section=case.section)
-    kinds = found["kind"].attrs["flag_meanings"].split()
-    others = [ending for ending in found["ending"].to_numpy().tolist() if "attractor" not in ending]
-    return {kinds[k] for k in found["kind"].to_numpy().tolist()} | set(others)
+    basins = udd.basins(case.model, grid, state0=case.start, section=case.section)
+    kinds = basins["kind"].attrs["flag_meanings"].split()
+    others = [ending for ending in basins["ending"].to_numpy().tolist() if "attractor" not in ending]
+    return {kinds[k] for k in basins["kind"].to_numpy().tolist()} | set(others)
 
 
 def main(count: int, seed: int) -> None:

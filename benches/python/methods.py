@@ -48,7 +48,7 @@ def measured(
         return run.state[-1]
 
     exact = [last(s, 1e-14, "dop853") for s in starts]
-    found = [last(s, rtol, method) for s in starts]
+    results = [last(s, rtol, method) for s in starts]
     # Longer runs, beside which the call itself takes no time; the best of several turns.
     rate = 0.0
     for _ in range(5):
@@ -57,7 +57,7 @@ def measured(
             last(s, rtol, method, LONGER)
         rate = max(rate, 2 * LONGER * end / (time.perf_counter() - began))
     size = np.abs(exact).max(axis=0)
-    return float(np.median(np.abs(np.subtract(found, exact) / size).max(axis=1))), rate
+    return float(np.median(np.abs(np.subtract(results, exact) / size).max(axis=1))), rate
 
 
 def main() -> None:

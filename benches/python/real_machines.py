@@ -55,14 +55,14 @@ def silverbox(folder: Path) -> list[dict[str, Any]]:
     for start in STARTS:
         record = part(start, start + LENGTH)
         since = time.perf_counter()
-        before, found = udd.fit(record, known), udd.discover(record, known)
+        before, result = udd.fit(record, known), udd.discover(record, known)
         rows.append(
             {
                 "machine": f"Silverbox, samples {start} to {start + LENGTH}",
-                "verdict": str(found.verdict),
-                "effects": [effect.title or effect.name for effect in found.model.effects],
+                "verdict": str(result.verdict),
+                "effects": [effect.title or effect.name for effect in result.model.effects],
                 "before": error(before.model),
-                "after": error(found.model),
+                "after": error(result.model),
                 "unit": "mV",
                 "seconds": time.perf_counter() - since,
             }
@@ -190,9 +190,9 @@ def main() -> None:
     for name in options.only.split(","):
         for row in MACHINES[name](options.folder):
             rows.append(row)
-            found = "; ".join(row["effects"]) or "nothing"
+            result = "; ".join(row["effects"]) or "nothing"
             errors = f"{said(row['before'])} {row['unit']} | {said(row['after'])} {row['unit']}"
-            cells = f"{row['machine']} | {row['verdict']} | {found} | {errors} | {row['seconds']:.0f}"
+            cells = f"{row['machine']} | {row['verdict']} | {result} | {errors} | {row['seconds']:.0f}"
             print(f"| {cells} |", flush=True)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))

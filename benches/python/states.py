@@ -30,12 +30,12 @@ METHODS = ("dopri5", "dop853", "taylor", "rodas")
 
 def best(turns: int, work: Callable[[], Any]) -> tuple[float, Any]:
     """The least time of several turns, and what came out."""
-    least, found = np.inf, None
+    least, result = np.inf, None
     for _ in range(turns):
         began = time.process_time()
-        found = work()
+        result = work()
         least = min(least, time.process_time() - began)
-    return least, found
+    return least, result
 
 
 def operations(model: udd.models.Model) -> int:
@@ -57,8 +57,8 @@ def main() -> None:
         line = f"{2 * oscillators:6d}  {count:10d}"
         for method in METHODS:
             run = partial(udd.simulate, model, [0.0, 400.0], start, method=method, rtol=1e-8)
-            taken, found = best(options.turns, run)
-            step = taken / (found.stats.accepted + found.stats.rejected)
+            taken, result = best(options.turns, run)
+            step = taken / (result.stats.accepted + result.stats.rejected)
             line += f"{1e6 * step:10.2f} {1e9 * step / count:7.1f}"
         print(line, flush=True)
 

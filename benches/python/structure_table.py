@@ -111,8 +111,8 @@ def exponents() -> None:
     roessler = udd.Model(["x", "y", "z"], ["-y-z", "x+0.2*y", "0.2+z*(x-5.7)"])
     sprott = udd.Model(["x", "y", "z"], ["y*z", "x-y", "1-x*y"])
     for name, model, known in (("Roessler", roessler, 0.0714), ("Sprott B", sprott, 0.2101)):
-        found, seconds = timed(lambda m=model: udd.lyapunov_spectrum(m, state0=[1.0, 1.0, 0.5], t=20_000.0))
-        row(f"{name}, largest exponent", seconds, float(found.exponents[0]), known, "Sprott (2003)")
+        result, seconds = timed(lambda m=model: udd.lyapunov_spectrum(m, state0=[1.0, 1.0, 0.5], t=20_000.0))
+        row(f"{name}, largest exponent", seconds, float(result.exponents[0]), known, "Sprott (2003)")
 
 
 def forced_and_conservative() -> None:

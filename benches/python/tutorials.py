@@ -40,14 +40,14 @@ from tutorial_models import (
 )
 
 
-def of(found: udd.Branch, kind: str) -> list[float]:
+def of(result: udd.Branch, kind: str) -> list[float]:
     """The values of the points of one kind, in order."""
-    return sorted(point.value for point in found.find(kind))
+    return sorted(point.value for point in result.find(kind))
 
 
-def special(found: udd.Locus, kind: str) -> list[float]:
+def special(result: udd.Locus, kind: str) -> list[float]:
     """The second parameter at the special points of one kind, in order."""
-    return sorted(float(point.values[1]) for point in found.points if point.kind == kind)
+    return sorted(float(point.values[1]) for point in result.points if point.kind == kind)
 
 
 def morris_lecar_cycles() -> tuple[list[float], list[float]]:
@@ -101,8 +101,8 @@ def degenerate() -> tuple[list[float], list[float]]:
 
 
 def nilpotent() -> tuple[list[float], list[float]]:
-    found = udd.equilibria(NILPOTENT)
-    return [float(len(found)), *found[0].state], [1.0, 0.0, 0.0, 0.0]
+    equilibria = udd.equilibria(NILPOTENT)
+    return [float(len(equilibria)), *equilibria[0].state], [1.0, 0.0, 0.0, 0.0]
 
 
 def chua() -> tuple[list[float], list[float]]:
@@ -122,9 +122,9 @@ def oxidation() -> tuple[list[float], list[float]]:
     branch = udd.continuation(rest, "q2", (0.5, 2.0))
     folds = udd.locus(branch.find("fold")[0], "k", (0.01, 2.0), within=(0.3, 3.0))
     hopfs = udd.locus(branch.find("Hopf")[0], "k", (0.01, 2.0), within=(0.3, 3.0))
-    found = of(branch, "fold") + of(branch, "Hopf") + special(folds, "cusp")
+    result = of(branch, "fold") + of(branch, "Hopf") + special(folds, "cusp")
     ends = special(hopfs, "Bogdanov-Takens")
-    return found + ends, [1.0420485, 1.0522003, 1.0409916, 1.0515575, 0.35599, 0.72234, 0.97140]
+    return result + ends, [1.0420485, 1.0522003, 1.0409916, 1.0515575, 0.35599, 0.72234, 0.97140]
 
 
 def bazykin() -> tuple[list[float], list[float]]:
@@ -137,13 +137,13 @@ def bazykin() -> tuple[list[float], list[float]]:
 def reaction() -> tuple[list[float], list[float]]:
     branch = udd.continuation(udd.equilibria(REACTION)[0], "p1", (0.0, 1.0))
     folds = udd.locus(branch.find("fold")[0], "p3", (1.0, 4.0), within=(0.0, 1.0))
-    found = of(branch, "fold") + of(branch, "Hopf") + special(folds, "cusp")
-    return found, [0.0889318, 0.105739, 0.1309, 2.5]
+    result = of(branch, "fold") + of(branch, "Hopf") + special(folds, "cusp")
+    return result, [0.0889318, 0.105739, 0.1309, 2.5]
 
 
 def jerk() -> tuple[list[float], list[float]]:
-    found = udd.connections(JERK, "mu", (0.5, 1.0))
-    return [one.value for one in found], [0.7398598229327773]
+    connections = udd.connections(JERK, "mu", (0.5, 1.0))
+    return [one.value for one in connections], [0.7398598229327773]
 
 
 CASES: list[Callable[[], tuple[list[float], list[float]]]] = [
@@ -164,14 +164,14 @@ def main() -> None:
     for number, case in enumerate(CASES, 1):
         begin = time.process_time()
         try:
-            found, right = case()
-            good = len(found) == len(right) and np.allclose(
-                found, right, rtol=2e-5, atol=5e-6
+            result, right = case()
+            good = len(result) == len(right) and np.allclose(
+                result, right, rtol=2e-5, atol=5e-6
             )  # published digits
         except (udd.UddError, IndexError, StopIteration) as error:
-            good, found = False, [str(error)]  # type: ignore[list-item]
+            good, result = False, [str(error)]  # type: ignore[list-item]
         seconds = time.process_time() - begin
-        word = "right" if good else f"wrong: {found}"
+        word = "right" if good else f"wrong: {result}"
         name = f"{number:2d} {case.__name__:24s}"
         print(f"{name} {seconds:6.1f} s {statements(case):2d} statements  {word}", flush=True)
 

@@ -85,14 +85,14 @@ def main(count: int, wanted: str) -> None:
             continue
         begin, wrong = time.perf_counter(), []
         for start in middle + spread * random.uniform(-1.0, 1.0, (count, len(middle))):
-            found = udd.lyapunov_spectrum(model, state0=start)
-            if found.verdict not in right:
-                wrong.append((start, found))
+            spectrum = udd.lyapunov_spectrum(model, state0=start)
+            if spectrum.verdict not in right:
+                wrong.append((start, spectrum))
         seconds = (time.perf_counter() - begin) / count
         print(f"{name:24s} {count - len(wrong):4d} of {count} right, {seconds:6.2f} s each", flush=True)
-        for start, found in wrong:
-            values = ", ".join(f"{value:.4g}" for value in found.exponents)
-            print(f"    from {np.round(start, 4).tolist()}: {found.verdict}, exponents {values}")
+        for start, spectrum in wrong:
+            values = ", ".join(f"{value:.4g}" for value in spectrum.exponents)
+            print(f"    from {np.round(start, 4).tolist()}: {spectrum.verdict}, exponents {values}")
 
 
 if __name__ == "__main__":

@@ -388,8 +388,8 @@ def test_steadily_rotating_is_steady_and_bistable_has_two_attractors() -> None:
     assert np.ptp(late) < 1e-3 * abs(late.mean())
     bistable = spec.start_of(offered["bistable"])
     values = np.linspace(bistable.model.parameters["w"] - 1e-3, bistable.model.parameters["w"] + 1e-3, 3)
-    found = maps._diagram(bistable.model, "w", values, maps.starts_of(bistable))
-    assert len({label for label in found.label[:, 1] if label > 0}) >= 2
+    result = maps._diagram(bistable.model, "w", values, maps.starts_of(bistable))
+    assert len({label for label in result.label[:, 1] if label > 0}) >= 2
 
 
 def test_every_word_that_the_page_says_is_in_its_file() -> None:

@@ -40,21 +40,21 @@ def table(folder: Path, head: str, *columns: np.ndarray, name: str = "table.csv"
     ],
 )
 def test_columns_are_guessed(head: str, guesses: list[str], tmp_path: Path) -> None:
-    found = look(table(tmp_path, head, T, SWING, T))
-    assert [column["guess"] for column in found["columns"]] == guesses
-    assert found["rows"] == 80 and len(found["columns"][0]["cells"]) == 6
+    result = look(table(tmp_path, head, T, SWING, T))
+    assert [column["guess"] for column in result["columns"]] == guesses
+    assert result["rows"] == 80 and len(result["columns"][0]["cells"]) == 6
 
 
 def test_a_disk_is_guessed(tmp_path: Path) -> None:
-    found = look(table(tmp_path, "Zeit;Y;Höhe;Drehwinkel", T, 0.01 * SWING, 0.01 * SWING, SWING))
-    assert [column["guess"] for column in found["columns"]] == ["t", "Y", "Z", "beta"]
+    result = look(table(tmp_path, "Zeit;Y;Höhe;Drehwinkel", T, 0.01 * SWING, 0.01 * SWING, SWING))
+    assert [column["guess"] for column in result["columns"]] == ["t", "Y", "Z", "beta"]
 
 
 def test_a_camera_s_axes_with_an_orientation_are_a_disk(tmp_path: Path) -> None:
-    found = look(table(tmp_path, "tijd (s);x (cm);y (cm);draaihoek (graden)", T, SWING, SWING, SWING))
-    assert [column["guess"] for column in found["columns"]] == ["t", "Y", "Z", "beta"]
-    assert [column["unit"] for column in found["columns"]] == ["s", "cm", "cm", "graden"]
-    assert found["kind"] == ""  # the page then takes the columns as guessed
+    result = look(table(tmp_path, "tijd (s);x (cm);y (cm);draaihoek (graden)", T, SWING, SWING, SWING))
+    assert [column["guess"] for column in result["columns"]] == ["t", "Y", "Z", "beta"]
+    assert [column["unit"] for column in result["columns"]] == ["s", "cm", "cm", "graden"]
+    assert result["kind"] == ""  # the page then takes the columns as guessed
     assert look(table(tmp_path, "t;x;y", T, SWING, SWING))["kind"] == "pendulum"
 
 

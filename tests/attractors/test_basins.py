@@ -45,9 +45,9 @@ def disc(n: int, shift: NDArray[np.float64]) -> NDArray[np.int32]:
 
 def test_the_error_of_a_fraction_is_that_of_a_grid() -> None:
     rng = np.random.default_rng(3)
-    found = [basin_fractions(disc(40, rng.random(2)), 2) for _ in range(300)]
-    misses = np.array([share[1] - np.pi * 0.09 for share, _ in found])
-    said = np.mean([error[1] for _, error in found])
+    results = [basin_fractions(disc(40, rng.random(2)), 2) for _ in range(300)]
+    misses = np.array([share[1] - np.pi * 0.09 for share, _ in results])
+    said = np.mean([error[1] for _, error in results])
     # Cell by cell on its own the scatter is that of the cells at the edge; collapsed strata of four
     # overestimate it (Cochran, Sampling Techniques, section 5A.12), here by less than 4.
     assert np.std(misses) < said < 4 * np.std(misses)
@@ -70,9 +70,9 @@ def test_points_without_an_ending_are_left_out() -> None:
 
 
 def test_a_smooth_boundary_has_exponent_one() -> None:
-    found = uncertainty(disc(256, np.array([0.3, 0.7])))
-    assert abs(found.exponent - 1.0) < 3 * found.standard_error
-    assert found.standard_error < 0.1
+    result = uncertainty(disc(256, np.array([0.3, 0.7])))
+    assert abs(result.exponent - 1.0) < 3 * result.standard_error
+    assert result.standard_error < 0.1
 
 
 def cantor(x: NDArray[np.float64], levels: int = 12) -> NDArray[np.int32]:
@@ -89,10 +89,10 @@ def cantor(x: NDArray[np.float64], levels: int = 12) -> NDArray[np.int32]:
 
 def test_a_fractal_boundary_has_its_exponent() -> None:
     # The dimension of Cantor's set is ln 2 / ln 3, so that of the exponent 1 - ln 2 / ln 3.
-    found = uncertainty(cantor((np.arange(6561) + 0.5) / 6561))
+    result = uncertainty(cantor((np.arange(6561) + 0.5) / 6561))
     # The law holds in steps of three only; over the four octaves here the slope is within 0.05 of it.
-    assert found.exponent == pytest.approx(1 - np.log(2) / np.log(3), abs=0.05)
-    assert 0 < found.standard_error < 0.15
+    assert result.exponent == pytest.approx(1 - np.log(2) / np.log(3), abs=0.05)
+    assert 0 < result.standard_error < 0.15
 
 
 def test_unrelated_neighbours_have_no_exponent() -> None:
@@ -152,22 +152,22 @@ def test_above_the_hopf_bifurcation_rotation_has_a_finite_basin() -> None:
 
 
 def test_below_the_hopf_bifurcation_nothing_comes_to_rest() -> None:
-    found = udd.basins(udd.DLE(3.0, 0.2), {"omega": np.linspace(-2, 2, 6), "z": [-1.0, 1.0]})
-    assert (found["kind"] != 0).all()
+    result = udd.basins(udd.DLE(3.0, 0.2), {"omega": np.linspace(-2, 2, 6), "z": [-1.0, 1.0]})
+    assert (result["kind"] != 0).all()
 
 
 def test_the_trap_at_4_5_is_no_attractor() -> None:
     # physics.md: a window 3e-5 wide, after a chaotic transient of mean length 8200.
-    found = udd.basins(udd.DLE(4.5), square(2, 8), state0=[0, 0.5, 0], max_extension=16)
-    assert (found["kind"] == 1).all()
-    assert float(found["fraction"].sel(ending="undecided")) > 0
+    result = udd.basins(udd.DLE(4.5), square(2, 8), state0=[0, 0.5, 0], max_extension=16)
+    assert (result["kind"] == 1).all()
+    assert float(result["fraction"].sel(ending="undecided")) > 0
 
 
 def test_chaos_is_an_attractor() -> None:
-    found = udd.basins(udd.DLE(1.0), square(2, 8), state0=[0, 0.5, 0])
-    assert found["kind"].to_numpy().tolist() == [2]
-    assert found["mirror"].to_numpy().tolist() == [1]
-    assert found["fraction"].to_numpy().tolist() == [1.0]
+    result = udd.basins(udd.DLE(1.0), square(2, 8), state0=[0, 0.5, 0])
+    assert result["kind"].to_numpy().tolist() == [2]
+    assert result["mirror"].to_numpy().tolist() == [1]
+    assert result["fraction"].to_numpy().tolist() == [1.0]
 
 
 def test_what_leaves_the_disk_is_ejected() -> None:
@@ -195,9 +195,9 @@ def test_the_threads_do_not_matter() -> None:
 
 
 def test_one_component_is_enough_and_four_are_too_many() -> None:
-    found = udd.basins(udd.DLE(9.0), {"z": np.linspace(-1, 1, 5)}, n=24)
-    assert found["attractor"].to_numpy().tolist() == [1] * 5
-    assert found.attrs["start_omega"] == 1.0
+    result = udd.basins(udd.DLE(9.0), {"z": np.linspace(-1, 1, 5)}, n=24)
+    assert result["attractor"].to_numpy().tolist() == [1] * 5
+    assert result.attrs["start_omega"] == 1.0
     with pytest.raises(ModelError, match="one to three components"):
         udd.basins(udd.DLE(9.0), {})
 
@@ -229,15 +229,15 @@ def test_ctrl_c_gives_what_is_finished() -> None:
             threads=1,
             progress=interrupting_progress(),
         )
-    found = stopped.value.partial
-    names = np.array(found["outcome"].attrs["flag_meanings"].split())[found["outcome"].to_numpy()]
+    partial = stopped.value.partial
+    names = np.array(partial["outcome"].attrs["flag_meanings"].split())[partial["outcome"].to_numpy()]
     finished = names == "finished"
     assert 0 < finished.sum() < finished.size
     assert (finished | (names == "interrupted")).all()
-    assert np.array_equal(found["attractor"].to_numpy() > 0, finished)
+    assert np.array_equal(partial["attractor"].to_numpy() > 0, finished)
     # Only what was run counts.
-    assert float(found["fraction"].sum()) == pytest.approx(1.0)
-    assert found.attrs["complete"] == 0
+    assert float(partial["fraction"].sum()) == pytest.approx(1.0)
+    assert partial.attrs["complete"] == 0
 
 
 # --- the picture and the command

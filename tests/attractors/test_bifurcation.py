@@ -137,9 +137,9 @@ def test_stretches_of_values() -> None:
 # --- the equations
 
 
-def grown(found: xr.Dataset, square: Floats, degree: int) -> float:
+def grown(result: xr.Dataset, square: Floats, degree: int) -> float:
     """Where a square that grows from zero begins, by a polynomial through its values."""
-    w = found["w"].to_numpy()
+    w = result["w"].to_numpy()
     # w as a function of the square: at zero it is the bifurcation.
     return float(np.polynomial.Polynomial.fit(square, w, degree)(0.0))
 
@@ -157,14 +157,14 @@ def test_the_period_doubles_where_it_should() -> None:
     assert grown(diagram, square, 3) == pytest.approx(5.394713224, abs=2e-5)
 
 
-def kinds(found: Any) -> list[str]:
-    names = str(found["kind"].attrs["flag_meanings"]).split()
-    return [names[k] for k in found["kind"].to_numpy().ravel()]
+def kinds(result: Any) -> list[str]:
+    names = str(result["kind"].attrs["flag_meanings"]).split()
+    return [names[k] for k in result["kind"].to_numpy().ravel()]
 
 
 def test_attractors_have_a_kind() -> None:
-    found = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 6.0, 9.0])
-    assert kinds(found) == ["chaos", "cycle", "cycle"]
+    result = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 6.0, 9.0])
+    assert kinds(result) == ["chaos", "cycle", "cycle"]
     # Rotation is stable from w = 10/3 on at B = 0.2; at B = 0.9 the disk comes to rest at z = 1/B.
     steady = udd.bifurcation(udd.DLE(1.0, B=0.2), "w", [3.7, 5.0], initial_states=[2.0, 2.0, 0.1])
     assert kinds(steady) == ["rotating_state"] * 2
@@ -185,8 +185,8 @@ def test_a_motion_of_two_frequencies_is_a_torus() -> None:
         },
         {"mu": 0.2, "s": 0.3037},
     )
-    found = udd.bifurcation(model, "mu", [-0.2, 0.2], initial_states=[0.5, 0.2, 0.3, 0.1])
-    assert kinds(found) == ["cycle", "torus"]
+    result = udd.bifurcation(model, "mu", [-0.2, 0.2], initial_states=[0.5, 0.2, 0.3, 0.1])
+    assert kinds(result) == ["cycle", "torus"]
 
 
 def test_the_symmetry_breaks_where_it_should() -> None:
@@ -204,8 +204,8 @@ def test_the_symmetry_breaks_where_it_should() -> None:
 def test_the_duration_of_periods() -> None:
     # physics.md: T at w = 0.25 (to six decimals) and at w = 10. At w = 0.25 the transient falls by
     # 0.995 from point to point; after 1000 it is below the digits given.
-    found = udd.bifurcation(udd.DLE(1.0), "w", [0.25, 10.0], transient=1000)
-    assert found["period_time"].to_numpy().ravel() == pytest.approx([22.737375, 3.35832224912], abs=6e-7)
+    result = udd.bifurcation(udd.DLE(1.0), "w", [0.25, 10.0], transient=1000)
+    assert result["period_time"].to_numpy().ravel() == pytest.approx([22.737375, 3.35832224912], abs=6e-7)
 
 
 def test_the_transient_near_the_symmetry_breaking_is_seen_through() -> None:
@@ -222,10 +222,10 @@ def test_the_transient_near_the_symmetry_breaking_is_seen_through() -> None:
 def second_orbit() -> Floats:
     """A state on one of the orbits that exist beside the figure-eight between w = 7.445 and 7.829."""
     axis = np.linspace(-4, 4, 10)
-    found = udd.basins(udd.DLE(7.6), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=48)
-    beside = found["number"].to_numpy()[found["mirror"] != found["number"]]
+    basins = udd.basins(udd.DLE(7.6), {"omega": axis, "z": axis}, state0=[0, 0.5, 0], n=48)
+    beside = basins["number"].to_numpy()[basins["mirror"] != basins["number"]]
     assert len(beside)
-    one = found.sel(number=beside[0]).isel(point=0)
+    one = basins.sel(number=beside[0]).isel(point=0)
     return np.array([float(one[f"orbit_{name}"]) for name in ("omega", "y", "z")])
 
 
@@ -248,24 +248,24 @@ def test_hysteresis_where_a_second_attractor_lives() -> None:
 
 
 def test_mirror_images_are_no_hysteresis() -> None:
-    found = udd.bifurcation(udd.DLE(1.0), "w", np.linspace(6.1, 7.4, 14), path="both")
-    assert found.sizes["interval"] == 0
-    assert not found["hysteresis"].any()
-    assert (found["period"] == 2).all()
+    result = udd.bifurcation(udd.DLE(1.0), "w", np.linspace(6.1, 7.4, 14), path="both")
+    assert result.sizes["interval"] == 0
+    assert not result["hysteresis"].any()
+    assert (result["period"] == 2).all()
 
 
 def test_a_symmetry_that_breaks_on_the_way_down_is_not_missed() -> None:
     # The symmetric orbit persists, unstable; a state exactly on it would stay for long.
-    found = udd.bifurcation(udd.DLE(1.0), "w", [6.9, 7.0, 7.05, 7.2], path="down")
-    assert found["symmetric"].to_numpy().ravel().tolist() == [0, 0, 0, 1]
+    result = udd.bifurcation(udd.DLE(1.0), "w", [6.9, 7.0, 7.05, 7.2], path="down")
+    assert result["symmetric"].to_numpy().ravel().tolist() == [0, 0, 0, 1]
 
 
 def test_the_disk_has_the_period_that_the_full_model_should() -> None:
     # physics.md: W = 0.071 m/s, an asymmetric pair with T = 1.384045926 s.
-    found = udd.bifurcation(udd.Disk(0.07, edge="ignore"), "W", [0.071], n=60)
-    assert found["symmetric"].to_numpy().ravel().tolist() == [0]
-    assert float(found["period_time"].squeeze()) == pytest.approx(1.384045926, abs=1e-8)
-    assert (found["Y"].attrs["units"], found["W"].attrs["units"]) == ("m", "m/s")
+    result = udd.bifurcation(udd.Disk(0.07, edge="ignore"), "W", [0.071], n=60)
+    assert result["symmetric"].to_numpy().ravel().tolist() == [0]
+    assert float(result["period_time"].squeeze()) == pytest.approx(1.384045926, abs=1e-8)
+    assert (result["Y"].attrs["units"], result["W"].attrs["units"]) == ("m", "m/s")
 
 
 def test_a_disk_that_leaves_the_wheels_is_an_outcome() -> None:
@@ -281,9 +281,9 @@ def test_a_disk_that_leaves_the_wheels_is_an_outcome() -> None:
 
 
 def test_the_points_follow_one_another() -> None:
-    found = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 3.0], n=20, transient=50, attractors=False)
-    for k, w in enumerate(found["w"].to_numpy()):
-        states = np.stack([found[name].to_numpy()[0, 0, k] for name in ("omega", "y", "z")], axis=1)
+    result = udd.bifurcation(udd.DLE(1.0), "w", [1.0, 3.0], n=20, transient=50, attractors=False)
+    for k, w in enumerate(result["w"].to_numpy()):
+        states = np.stack([result[name].to_numpy()[0, 0, k] for name in ("omega", "y", "z")], axis=1)
         assert np.abs(states[:, 2]).max() <= 1e-12
         assert (udd.DLE(w).rates(0.0, states)[:, 2] > 0).all()
         for one, following in pairwise(states):

@@ -110,10 +110,10 @@ def test_the_exponents_of_five_states_are_those_of_the_parts() -> None:
         ["x", "y", "z", "u", "v"],
         ["10*(y-x)", "28*x - y - x*z", "x*y - 8/3*z", "v", "(1-u^2)*v - u"],
     )
-    found = udd.lyapunov_spectrum(both, state0=[1.0, 1.0, 1.0, 2.0, 0.0], t=400.0, tol=1.0)
+    spectrum = udd.lyapunov_spectrum(both, state0=[1.0, 1.0, 1.0, 2.0, 0.0], t=400.0, tol=1.0)
     # Lorenz's, 0 and the logarithm of Van der Pol's multiplier, 8.5969507e-4, by the period.
     known = np.array([0.9056, 0.0, 0.0, np.log(8.5969507e-4) / 6.6632868593, -14.5723])
-    assert np.all(np.abs(found.exponents - known) < 5.0 * found.standard_errors)
+    assert np.all(np.abs(spectrum.exponents - known) < 5.0 * spectrum.standard_errors)
     vectors = udd.covariant_vectors(both, state0=[1.0, 1.0, 1.0, 2.0, 0.0]).vectors
     # The most contracting direction is Lorenz's: nothing of it is in the other oscillator.
     assert np.abs(vectors[:500, 4, 3:]).max() < 1e-6
@@ -127,8 +127,8 @@ def test_one_state_alone() -> None:
     exact = starts / np.sqrt(starts**2 + (1 - starts**2) * np.exp(-2 * t))
     assert udd.ensemble(line, t, starts).state[..., 0] == pytest.approx(exact, abs=1e-8)
     assert udd.lyapunov_spectrum(line, state0=[0.5]).exponents == pytest.approx([-2.0], abs=1e-8)
-    found = udd.basins(line, {"x": np.linspace(-2.0, 2.0, 8)}, t_max=500.0)
-    np.testing.assert_allclose(found.fraction, [0.5, 0.5])
+    basins = udd.basins(line, {"x": np.linspace(-2.0, 2.0, 8)}, t_max=500.0)
+    np.testing.assert_allclose(basins.fraction, [0.5, 0.5])
     assert udd.poincare(udd.Model(["x"], ["cos(t)"]), "x", 4, state0=[0.0], transient=0).t == pytest.approx(
         2.0 * np.pi * np.arange(1, 5), abs=1e-8
     )

@@ -42,6 +42,6 @@ def test_branches_curves_and_spectra_are_labelled_arrays() -> None:
     np.testing.assert_array_equal(labelled.B.values, curve.values[:, 1])
     assert labelled.sizes["special"] == 0 and labelled.attrs["kind"] == "Hopf"
     spectrum = udd.lyapunov_spectrum(10.0)
-    found = spectrum.to_xarray()
-    np.testing.assert_array_equal(found.exponent.values, spectrum.exponents)
-    assert found.attrs["verdict"] == spectrum.verdict
+    result = spectrum.to_xarray()
+    np.testing.assert_array_equal(result.exponent.values, spectrum.exponents)
+    assert result.attrs["verdict"] == spectrum.verdict

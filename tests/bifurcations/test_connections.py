@@ -15,20 +15,20 @@ from udd.errors import ModelError
 
 def test_lorenz_has_his_homoclinic_orbit() -> None:
     lorenz = udd.Model(["x", "y", "z"], ["10*(y-x)", "r*x-y-x*z", "x*y-8/3*z"], {"r": 28.0})
-    found = udd.connections(lorenz, "r", (10.0, 16.0), n=10)
-    (one,) = found
+    connections = udd.connections(lorenz, "r", (10.0, 16.0), n=10)
+    (one,) = connections
     # Published with fewer digits: 13.926 (C. Sparrow, The Lorenz equations, 1982).
     assert one.kind == "homoclinic" and one.value == pytest.approx(13.926557407520, abs=1e-9)
     assert one.error < 1e-11
     np.testing.assert_allclose(one.equilibrium.state, 0.0, atol=1e-12)
-    assert found.search.startswith("1 manifolds compared at 10 values of r from 10 to 16")
+    assert connections.search.startswith("1 manifolds compared at 10 values of r from 10 to 16")
 
 
 def test_the_dle_has_those_that_another_integrator_has() -> None:
     # About one with a saddle-focus there are others, of more rounds, which take longer.
-    found = udd.connections(udd.DLE(3.4), "w", (3.36, 3.4), n=10, t_max=11.0)
-    assert all(one.wild and one.error < 1e-11 for one in found)
-    (one,) = (one for one in found if one.kind == "homoclinic")
+    connections = udd.connections(udd.DLE(3.4), "w", (3.36, 3.4), n=10, t_max=11.0)
+    assert all(one.wild and one.error < 1e-11 for one in connections)
+    (one,) = (one for one in connections if one.kind == "homoclinic")
     assert one.value == pytest.approx(3.3768624337325, abs=1e-9)
 
     def nearest(w: float) -> tuple[float, int]:
@@ -69,9 +69,9 @@ def test_the_dle_has_those_that_another_integrator_has() -> None:
 def test_what_is_found_does_not_hang_on_the_grid(n: int) -> None:
     # Pairs so near to each other that coarse grids stepped over both, and fine ones saw no change.
     known = [6.46524562656, 6.465246585675]
-    found = udd.connections(udd.DLE(6.0), "w", (6.3, 6.6), n=n, t_max=12.0)
-    np.testing.assert_allclose([one.value for one in found], known, atol=1e-11)
-    assert found.search.endswith("longer ones may exist")
+    connections = udd.connections(udd.DLE(6.0), "w", (6.3, 6.6), n=n, t_max=12.0)
+    np.testing.assert_allclose([one.value for one in connections], known, atol=1e-11)
+    assert connections.search.endswith("longer ones may exist")
 
 
 def test_a_model_that_blows_up_on_one_side_of_its_connection() -> None:

@@ -36,18 +36,18 @@ def test_a_multiple_root_away_from_the_origin_is_known_to_rounding() -> None:
 
 
 def test_a_line_of_equilibria_is_not_isolated() -> None:
-    found = udd.equilibria(SIR)
-    assert found and all(rest.state[1] == 0.0 and not rest.isolated for rest in found)
-    assert {rest.kind for rest in found} == {"not isolated"} and "not isolated" in found.search
+    result = udd.equilibria(SIR)
+    assert result and all(rest.state[1] == 0.0 and not rest.isolated for rest in result)
+    assert {rest.kind for rest in result} == {"not isolated"} and "not isolated" in result.search
     given = udd.equilibria(SIR, near=[0.3, 0.0])
     assert any(np.allclose(rest.state, [0.3, 0.0], atol=1e-12) for rest in given)
 
 
 def test_a_list_says_whether_it_is_complete() -> None:
     wells = udd.Model(["x", "y", "z"], ["x - x^3", "y - y^3", "z - z^3"])
-    found = udd.equilibria(wells)
-    assert len(found) == 27
-    assert found.search == "all isolated equilibria: a homotopy with 27 paths, the Bezout number"
+    result = udd.equilibria(wells)
+    assert len(result) == 27
+    assert result.search == "all isolated equilibria: a homotopy with 27 paths, the Bezout number"
     assert "others may exist" in udd.equilibria(udd.Model(["x"], ["exp(x) - 2"])).search
 
 

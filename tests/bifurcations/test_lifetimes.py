@@ -28,8 +28,8 @@ def test_chaos_beside_stable_rotation_lasts_as_long_as_is_known() -> None:
 def test_what_settles_at_once_and_what_never_does() -> None:
     oscillator = udd.Model(["x", "v"], ["v", "(1 - x^2)*v - x"])
     cycle = udd.periodic_orbit(oscillator, [2.0, 0.0], settle=50.0)
-    found = udd.lifetimes(oscillator, [[2.0, 0.0], [0.01, 0.0]], cycle, t_max=100.0, after=0.0)
-    assert found.settled.all() and found.time[0] < 3.0 < 5.0 < found.time[1] < 30.0
+    result = udd.lifetimes(oscillator, [[2.0, 0.0], [0.01, 0.0]], cycle, t_max=100.0, after=0.0)
+    assert result.settled.all() and result.time[0] < 3.0 < 5.0 < result.time[1] < 30.0
     chaos = udd.DLE(10.0)
     never = udd.lifetimes(chaos, [[1.0, 1.0, 0.01]], udd.periodic_orbit(chaos), t_max=0.5)
     assert not never.settled.any() and never.mean == np.inf and np.isnan(never.standard_error)

@@ -67,8 +67,8 @@ def test_bazykins_cusps_are_triple_roots() -> None:
     curve = udd.locus(branch.find("fold")[0], "d", (0.0, 3.0), within=(0.0, 2.0))
     assert curve.ends == ("the branch is closed",) * 2
     cusps = _of(curve, "cusp")
-    found = [tuple(point.values.round(5)) for point in cusps]
-    assert found == [(0.90123, 0.00357), (0.08877, 2.80236)]
+    results = [tuple(point.values.round(5)) for point in cusps]
+    assert results == [(0.90123, 0.00357), (0.08877, 2.80236)]
     for cusp in cusps:
         al, d = cusp.values
         # With y from the first equation the second one is a cubic of x.
@@ -161,8 +161,8 @@ def test_homoclinic_orbits_are_followed_over_two_parameters() -> None:
 
 @pytest.mark.nightly  # test_homoclinic_orbits_are_followed_over_two_parameters follows another
 def test_a_shilnikov_orbit_of_the_damped_model_leads_to_that_without_damping() -> None:
-    found = udd.connections(udd.DLE(3.38), "w", (3.37686, 3.37687), n=2, t_max=11.0)
-    one = next(one for one in found if one.kind == "homoclinic")
+    connections = udd.connections(udd.DLE(3.38), "w", (3.37686, 3.37687), n=2, t_max=11.0)
+    one = next(one for one in connections if one.kind == "homoclinic")
     curve = udd.locus(one, "B", (0.0, 0.001), within=(3.0, 4.0), ds=0.2)
     damped = curve.solutions[-1]
     assert curve.ends == ("the bound 0", "the bound 0.001") and isinstance(damped, udd.Connection)

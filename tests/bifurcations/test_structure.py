@@ -66,13 +66,13 @@ def test_a_pendulum_hangs_or_stands() -> None:
 def test_the_disk_has_three_rotating_states_where_friction_falls_with_speed() -> None:
     W = 0.0045
     disk = udd.Disk(W)
-    found = sorted(rest.state[0] for rest in udd.equilibria(disk) if rest.state[0] > 0)
+    ordered = sorted(rest.state[0] for rest in udd.equilibria(disk) if rest.state[0] > 0)
 
     def power(omega: float) -> float:
         return max(0.103 - 0.055 * omega, 0.012) * omega**2 - 9.81 * W
 
     known = [optimize.brentq(power, a, b, xtol=1e-15) for a, b in ((0.1, 1.2), (1.3, 1.65), (1.66, 5.0))]
-    np.testing.assert_allclose(found, known, rtol=1e-12)
+    np.testing.assert_allclose(ordered, known, rtol=1e-12)
 
 
 @pytest.mark.parametrize("w", PERIODS)
@@ -430,10 +430,10 @@ def test_the_disks_connection_has_cycles_that_wind_towards_it() -> None:
     # From the lower end of the symmetric cycles; 0.0126 is where the folds of the branch born there gather.
     lower = udd.continuation(udd.periodic_orbit(udd.Disk(0.088)), "W", (0.009, 0.09), direction="down")
     born = udd.continuation(lower.find("symmetry breaking")[-1], bounds=(0.005, 0.05), max_period=9.0)
-    found = udd.connection(born)
-    assert found.kind == "homoclinic" and found.wild and found.error < 1e-9
+    result = udd.connection(born)
+    assert result.kind == "homoclinic" and result.wild and result.error < 1e-9
     folds = np.array([fold.value for fold in born.find("fold")])
-    assert folds[-2:].min() < found.value < folds[-2:].max()
+    assert folds[-2:].min() < result.value < folds[-2:].max()
 
 
 def test_a_diagram_joins_what_is_seen_and_what_is_behind_it() -> None:
@@ -496,9 +496,9 @@ def test_the_command_follows_branches_born_at_mirror_images_once(capsys: pytest.
     assert (
         main(["continuation", "w", "--of", "equilibria", "--B", "0.2", *span, "--born", "2", "--json"]) == 0
     )
-    found = json.loads(capsys.readouterr().out)["branches"]
+    result = json.loads(capsys.readouterr().out)["branches"]
     # Two rotating states, mirror images of one another; the cycles born at their Hopf points come once.
-    assert [branch["kind"] for branch in found] == ["equilibrium"] * 3 + ["cycle"]
+    assert [branch["kind"] for branch in result] == ["equilibrium"] * 3 + ["cycle"]
 
 
 def test_the_command_passes_over_a_branch_that_is_not_found(
@@ -593,8 +593,8 @@ def test_multipliers_that_break_liouvilles_formula_bring_no_bifurcation(
     orbit, right = udd.periodic_orbit(udd.DLE(7.3)), floquet_multipliers.multipliers_at
 
     def wrong(curve: object, u: np.ndarray) -> floquet_multipliers.Multipliers:
-        found = right(curve, u)  # type: ignore[arg-type]
-        return replace(found, log=found.log + np.array([0.0, 5.0]))
+        result = right(curve, u)  # type: ignore[arg-type]
+        return replace(result, log=result.log + np.array([0.0, 5.0]))
 
     monkeypatch.setattr(orbit_geometry, "multipliers_at", wrong)
     monkeypatch.setattr(shooting_curve, "multipliers_at", wrong)

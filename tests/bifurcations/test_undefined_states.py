@@ -28,9 +28,9 @@ def herd_predation() -> udd.Model:
 
 @pytest.mark.parametrize("near", [None, [4.0, 6.0]])
 def test_tanks_have_their_levels(near: list[float] | None) -> None:
-    found = udd.equilibria(two_tanks(), near=near)
+    result = udd.equilibria(two_tanks(), near=near)
     # (q/a)^2 and (q/b)^2.
-    assert [rest.state.tolist() for rest in found] == [pytest.approx([4.0, 6.25], abs=1e-12)]
+    assert [rest.state.tolist() for rest in result] == [pytest.approx([4.0, 6.25], abs=1e-12)]
 
 
 def test_tanks_are_followed_over_their_inflow() -> None:
@@ -51,9 +51,9 @@ def test_a_switch_has_three_states_with_an_exponent_that_is_a_parameter() -> Non
 
 
 def test_a_herd_has_its_coexistence_and_its_cycle_is_not_refused() -> None:
-    found = udd.equilibria(herd_predation(), near=[0.25, 0.375])
+    result = udd.equilibria(herd_predation(), near=[0.25, 0.375])
     # (s/c)^2 and sqrt(N) (1 - N).
-    assert any(np.allclose(rest.state, [0.25, 0.375], atol=1e-10) for rest in found)
+    assert any(np.allclose(rest.state, [0.25, 0.375], atol=1e-10) for rest in result)
     # Trace sqrt(N)(1 - 3N)/(2 sqrt(N)) > 0 below N = 1/3: unstable. There is no refusal as "depends on time".
     model = udd.Model(["x", "v"], ["v", "-x^1.5 + 1 - 0.0*v"])
     assert udd.periodic_orbit(model, [1.2, 0.0], period=5.1).period == pytest.approx(5.13, abs=0.05)

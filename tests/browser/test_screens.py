@@ -40,7 +40,7 @@ def test_a_screen(browser: Any, link: str, size: str, screen: str) -> None:
     for box in page.query_selector_all("#panel details"):
         box.evaluate("(d) => (d.open = true)")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    found = axe.Axe().run(page)
-    assert found.violations_count == 0, found.generate_report()
+    result = axe.Axe().run(page)
+    assert result.violations_count == 0, result.generate_report()
     one.context.close()
     assert one.said == []

@@ -56,8 +56,8 @@ except udd.errors.IntegrationError as error:
 
 def test_exponents_of_motion_that_grows_are_found() -> None:
     growing = udd.Model(["x", "y"], ["0.5*x", "-y"], {})
-    found = udd.lyapunov_spectrum(growing, t=500.0, state0=[1e-3, 1.0])
-    assert np.allclose(found.exponents, [0.5, -1.0], atol=1e-3)
+    spectrum = udd.lyapunov_spectrum(growing, t=500.0, state0=[1e-3, 1.0])
+    assert np.allclose(spectrum.exponents, [0.5, -1.0], atol=1e-3)
 
 
 def test_a_blow_up_escapes() -> None:

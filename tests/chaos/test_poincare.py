@@ -62,8 +62,8 @@ def test_points_are_those_of_scipy(name: str, sign: int, direction: str) -> None
 
 def test_the_periods_of_closed_orbits() -> None:
     # Half the symmetric orbit's period from one upward crossing of z = 0 to the next.
-    found = udd.poincare(udd.DLE(10.0), n=50, transient=2000)
-    np.testing.assert_allclose(found.return_times, 3.35832224912 / 2, atol=1e-9)
+    result = udd.poincare(udd.DLE(10.0), n=50, transient=2000)
+    np.testing.assert_allclose(result.return_times, 3.35832224912 / 2, atol=1e-9)
     # The asymmetric pair of the full model at W = 0.071.
     disk = udd.poincare(udd.Disk(0.071, edge="ignore"), n=40, transient=2000)
     y = disk.component("Y")
@@ -156,10 +156,10 @@ def test_orbits_without_enough_crossings_say_why() -> None:
 
 
 def test_maps() -> None:
-    found = udd.poincare(udd.DLE(1.0), n=600)
-    x, following = found.return_map("y")
+    result = udd.poincare(udd.DLE(1.0), n=600)
+    x, following = result.return_map("y")
     np.testing.assert_array_equal(x[1:], following[:-1])
-    height, next_height = found.cusp_map()
+    height, next_height = result.cusp_map()
     assert height.shape == next_height.shape == (599,)
     # The flow contracts so fast that one height nearly fixes the next: neighbours have near images.
     order = np.argsort(height)
@@ -203,10 +203,10 @@ def test_ctrl_c_keeps_what_is_found() -> None:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     assert threading.active_count() >= 1
-    found = stopped.value.partial
-    assert 0 < found.found < 10_000_000
-    assert found.outcome == "interrupted"
-    assert found.t.shape == (found.found,)
+    partial = stopped.value.partial
+    assert 0 < partial.found < 10_000_000
+    assert partial.outcome == "interrupted"
+    assert partial.t.shape == (partial.found,)
 
 
 BAD = {

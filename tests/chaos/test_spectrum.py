@@ -59,10 +59,10 @@ def test_an_equilibrium():
 
 def test_a_motion_of_two_frequencies_is_a_torus():
     equations = ["v", "(1-x^2)*v-x", "w", "2*(1-y^2)*w-y"]
-    found = udd.lyapunov_spectrum(udd.Model(["x", "v", "y", "w"], equations), state0=[1.0, 0.0, 0.5, 0.3])
-    assert found.verdict == "torus"
+    result = udd.lyapunov_spectrum(udd.Model(["x", "v", "y", "w"], equations), state0=[1.0, 0.0, 0.5, 0.3])
+    assert result.verdict == "torus"
     # Exponents along it are averages that go to zero as 1/t; the dimension is that of the torus.
-    assert found.dimension == 2.0
+    assert result.dimension == 2.0
 
 
 @pytest.mark.parametrize(("energy", "y"), [(1 / 12, 0.25), (1 / 8, 0.3), (1 / 12, 0.1)])
@@ -136,9 +136,9 @@ def test_the_section_of_a_periodic_orbit_has_as_many_points_as_its_period(w, sec
 
 def test_a_surface_that_is_not_crossed_is_said():
     with pytest.warns(udd.errors.IncompleteWarning, match="0 crossings instead of 600"):
-        found = udd.lyapunov_spectrum(1.0, tol=0.02, section="z = 100")
-    assert found.section.found == 0
-    assert found.verdict == "chaos"
+        result = udd.lyapunov_spectrum(1.0, tol=0.02, section="z = 100")
+    assert result.section.found == 0
+    assert result.verdict == "chaos"
 
 
 def test_the_disk():
@@ -151,8 +151,8 @@ def test_the_disk():
 
 def test_a_contact_that_sticks_has_an_exponent_of_minus_infinity():
     rod = udd.Pendulum(0.5, k0=0.0).with_effects(udd.effects.coulomb(c=0.2, treatment="set-valued"))
-    found = udd.lyapunov_spectrum(rod, state0=[0.0, 1.0], t=60.0, transient=0.0, tol=1.0)
-    assert found.exponents[-1] == -np.inf
+    result = udd.lyapunov_spectrum(rod, state0=[0.0, 1.0], t=60.0, transient=0.0, tol=1.0)
+    assert result.exponents[-1] == -np.inf
 
 
 def test_covariant_vectors():
@@ -223,8 +223,8 @@ def test_error_bars_are_honest():
     """A hundred orbits scatter by their standard errors."""
     starts = np.random.default_rng(5).normal(size=(100, 3))
     with pytest.warns(udd.ConvergenceWarning):
-        found = [udd.lyapunov(udd.DLE(1.0), state0=s, t=3e4, tol=1e-9, with_error=True) for s in starts]
-    values, errors = np.array(found).T
+        results = [udd.lyapunov(udd.DLE(1.0), state0=s, t=3e4, tol=1e-9, with_error=True) for s in starts]
+    values, errors = np.array(results).T
     chi2 = ((values - 0.21016) ** 2 / errors**2).mean()
     # The mean of 100 squares of normal deviates, 1 +- 0.14; blocks are few, which widens their tails.
     assert 0.6 < chi2 < 1.6

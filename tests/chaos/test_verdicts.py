@@ -38,9 +38,9 @@ XV = ["x", "v"]
     ],
 )
 def test_verdicts(model: udd.Model, start: list[float], verdict: str, dimension: float) -> None:
-    found = udd.lyapunov_spectrum(model, state0=start)
-    assert found.verdict == verdict
-    assert found.dimension == dimension or np.isnan([found.dimension, dimension]).all()
+    spectrum = udd.lyapunov_spectrum(model, state0=start)
+    assert spectrum.verdict == verdict
+    assert spectrum.dimension == dimension or np.isnan([spectrum.dimension, dimension]).all()
 
 
 # Decays that are slower than any exponential. The distance from 0 falls with a power of the time.
@@ -100,8 +100,8 @@ def test_a_slow_escape_is_no_decay(rates: list[str], start: list[float]) -> None
 def test_a_running_phase_has_its_period() -> None:
     # Adler's equation: T = 2 pi/sqrt(a^2 - 1).
     model = udd.Model(["q"], ["a - sin(q)"], {"a": 1.5}, angles=["q"])
-    found = udd.lyapunov_spectrum(model, state0=[0.0])
-    assert found.period == pytest.approx(2 * np.pi / np.sqrt(1.25), rel=1e-6)
+    spectrum = udd.lyapunov_spectrum(model, state0=[0.0])
+    assert spectrum.period == pytest.approx(2 * np.pi / np.sqrt(1.25), rel=1e-6)
 
 
 def test_a_passage_by_an_equilibrium_is_no_rest() -> None:
@@ -122,5 +122,7 @@ def test_a_disk_that_leaves_and_a_law_that_ends_are_no_escape() -> None:
 @pytest.mark.parametrize("number", [32, 36, 39, 40, 47, 48, 49, 53, 57, 60])
 def test_known_attractors(number: int) -> None:
     case = list(drawn(number + 1, 7))[number]
-    found = udd.lyapunov_spectrum(case.model, state0=case.start, tol=5e-3 * max(1.0, case.model.time_scale))
-    assert found.verdict == case.kind
+    spectrum = udd.lyapunov_spectrum(
+        case.model, state0=case.start, tol=5e-3 * max(1.0, case.model.time_scale)
+    )
+    assert spectrum.verdict == case.kind

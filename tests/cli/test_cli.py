@@ -55,8 +55,8 @@ def data(argv: list[object], capsys: pytest.CaptureFixture[str]) -> dict[str, ob
     """Return the output of a command with `--json`."""
     assert main([*(str(a) for a in argv), "--json"]) == 0
     out, _ = capsys.readouterr()
-    found: dict[str, object] = json.loads(out, parse_constant=lambda x: pytest.fail(f"{x} is not JSON"))
-    return found
+    result: dict[str, object] = json.loads(out, parse_constant=lambda x: pytest.fail(f"{x} is not JSON"))
+    return result
 
 
 # --- simulate
@@ -207,10 +207,10 @@ def test_discover_tells_the_verdict_first(
 
 
 def test_discover_as_json(swing: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = data(["discover", swing, "--pendulum", "0.6"], capsys)
-    assert found["verdict"] == discovered.pendulum().verdict
-    assert found["effects"]
-    assert [one["name"] for one in found["noise"]] == ["theta"]
+    result = data(["discover", swing, "--pendulum", "0.6"], capsys)
+    assert result["verdict"] == discovered.pendulum().verdict
+    assert result["effects"]
+    assert [one["name"] for one in result["noise"]] == ["theta"]
 
 
 def test_a_record_is_held_out_by_its_name_or_number(
@@ -229,9 +229,9 @@ def test_a_record_is_held_out_by_its_name_or_number(
         json.dumps({"states": ["x", "v"], "equations": equations, "parameters": {"k": 4.0, "c": 0.1}})
     )
     argv = ["discover", *files, "--model", model, "--report", tmp_path / "page.html", "--held-out"]
-    found = data([*argv, files[0]], capsys)
-    assert found["held_out_records"] == [0]
-    assert found["verdict"] == "effect identified" and len(found["effects"]) == 1
+    result = data([*argv, files[0]], capsys)
+    assert result["held_out_records"] == [0]
+    assert result["verdict"] == "effect identified" and len(result["effects"]) == 1
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Whole records, by number 0, were not used for the fit." in page
     assert "b.csv" in page  # what is shown
@@ -353,9 +353,9 @@ def test_columns_and_inputs_by_name_of_several_kinds_of_files(
     argv += ["--columns", "theta=Winkel", "--inputs", "tau=Moment"]
     assert main([*map(str, argv), "--json"]) == 0
     out, err = capsys.readouterr()
-    found = json.loads(out)["parameters"]
+    result = json.loads(out)["parameters"]
     assert (
-        abs(found["a"]["value"] - 16.01) < 0.1 and abs(found["c"]["value"] - 0.2) < 0.1
+        abs(result["a"]["value"] - 16.01) < 0.1 and abs(result["c"]["value"] - 0.2) < 0.1
     )  # by the closed form
     assert (
         "a.csv: read t from Zeit (s), theta from Winkel (deg), deg to rad, input tau from Moment (N m)" in err
@@ -821,10 +821,10 @@ def test_the_demonstration_of_a_disk_that_lacks_nothing_takes_the_other_film(
     monkeypatch.setattr(
         udd.Discovery, "report", lambda _self, path, **more: told.append({"path": path} | more)
     )
-    found = data(["demo", "--null", "--out", tmp_path / "new"], capsys)
-    assert films == ["sample_null.mp4"] and found["verdict"] == "nothing missing"
-    assert Path(str(found["measurement"])) == tmp_path / "new" / "measurement_null.csv"
-    assert udd.read_measurement(str(found["measurement"])).meta["W"] == 0.042
+    result = data(["demo", "--null", "--out", tmp_path / "new"], capsys)
+    assert films == ["sample_null.mp4"] and result["verdict"] == "nothing missing"
+    assert Path(str(result["measurement"])) == tmp_path / "new" / "measurement_null.csv"
+    assert udd.read_measurement(str(result["measurement"])).meta["W"] == 0.042
     (page,) = told
     assert page["path"] == tmp_path / "new" / "report_null.html" and page["command"] == "udd demo --null"
 

@@ -45,12 +45,12 @@ def test_a_law_of_no_library_is_located_and_described(case):
     fit = udd.fit(unmodelled.record(weak(case), 5), udd.Disk(W))
     result = scan_curves(fit)
     best = result.curves[0]
-    assert best.name in case.found
+    assert best.name in case.places
     assert (
         min(c.p for c in result.curves) * result.comparisons < 1e-4
     )  # a tenth of what a search takes to accept it
     # Friction over the speed has an infinite slope at rest, where it does nothing; its torque is smooth.
-    curve = identifiable_part(refined(next(c for c in result.curves if c.name == case.found[0]), fit), fit)
+    curve = identifiable_part(refined(next(c for c in result.curves if c.name == case.places[0]), fit), fit)
     described = formulas_for(curve, int(np.isfinite(fit.misfit).sum()))
     assert described[0].nats > -10  # nats: as probable as the curve
     # Some formula within the ten nats is the law, nearly as closely as the curve is known where the data are.
@@ -166,7 +166,7 @@ def test_bands_hold_the_law(case, records):
     inside = []
     for seed in range(records):
         fit = udd.fit(unmodelled.record(weak(case, 0.4), seed), udd.Disk(W))
-        only = scan_curves(fit, only=lambda slot, each: (slot.title, each[0].name) == case.found[0])
+        only = scan_curves(fit, only=lambda slot, each: (slot.title, each[0].name) == case.places[0])
         curve = identifiable_part(refined(only.curves[0], fit), fit)
         places = curve.places[0]
         places = np.mod(places, 2 * np.pi) if curve.splines[0].periodic else places
@@ -445,7 +445,7 @@ def test_without_pyoperon_the_usual_forms_are_tried(monkeypatch):
     case = unmodelled.CASES[0]
     fit = udd.fit(unmodelled.record(weak(case), 5, 40.0), udd.Disk(W))
     monkeypatch.setitem(sys.modules, "pyoperon.sklearn", None)
-    only = scan_curves(fit, only=lambda slot, each: (slot.title, each[0].name) == case.found[0])
+    only = scan_curves(fit, only=lambda slot, each: (slot.title, each[0].name) == case.places[0])
     assert formulas_for(only.curves[0], 3000)
 
 
@@ -490,7 +490,7 @@ def test_moves_that_lead_astray_are_halved():
     measured = unmodelled.record(weak(case, 4.0), 1)
     base = fit_record(measured, record_of(measured), udd.Disk(W), search=True)
     curves = scan_curves(with_larger_model_error(base, 3.0)).curves
-    result = fit_curve(base, next(c for c in curves if c.name == case.found[0]))
+    result = fit_curve(base, next(c for c in curves if c.name == case.places[0]))
     assert result.fit.converged and result.fit.level == base.level
     # Not to the noise, for so far from the known model one curve does not do; full moves end in no fit.
     assert result.fit.scatter < 0.2 * base.scatter

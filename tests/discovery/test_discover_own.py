@@ -52,9 +52,9 @@ def seen(
     return udd.Measurement(t, values)
 
 
-def within(found: udd.Discovery, name: str, truth: float) -> None:
+def within(answer: udd.Discovery, name: str, truth: float) -> None:
     """The value lies within four standard errors, which are below a tenth of it."""
-    value, error = found.fit.parameters[name], found.fit.errors[name]
+    value, error = answer.fit.parameters[name], answer.fit.errors[name]
     assert abs(value - truth) < 4 * error < 0.4 * abs(truth)
 
 

@@ -57,9 +57,9 @@ LAWS = [
 ]
 
 
-def best_of(found: ScoreRound, name: str) -> float:
+def best_of(answer: ScoreRound, name: str) -> float:
     """The score of a law, in units of the best score."""
-    usable = found.usable()
+    usable = answer.usable()
     most = max(s.chi2 for s in usable)
     return (
         max((s.chi2 for s in usable if name in (s.candidate.effect.name, s.candidate.title)), default=0.0)
@@ -192,9 +192,9 @@ def test_a_cart_s_places_are_within_its_way():
 )
 def test_a_law_of_the_speed_is_no_brake_near_an_angle_and_no_constant_torque(law, name):
     plain = udd.Pendulum(0.5, k0=0.01)
-    found = udd.discover(seen(plain.with_effects([law]), noise=2e-3), plain, progress=False)
-    assert name in [one.effect.name for one in found.effects]
-    assert not {"local_brake", "constant_torque"} & {one.effect.name for one in found.effects}
+    discovery = udd.discover(seen(plain.with_effects([law]), noise=2e-3), plain, progress=False)
+    assert name in [one.effect.name for one in discovery.effects]
+    assert not {"local_brake", "constant_torque"} & {one.effect.name for one in discovery.effects}
 
 
 @pytest.mark.parametrize(("offset", "listed"), [(0.0, True), (6.0, False)])

@@ -46,5 +46,5 @@ def test_a_cart_with_uneven_frames_lacks_nothing() -> None:
     force = np.sin(1.7 * t)
     x = udd.simulate(cart, t, [0.05, 0.0], inputs={"F": force}).state[:, 0]
     record = udd.Measurement(t, {"x": x + NOISE * rng.standard_normal(N)}, inputs={"F": force})
-    found = udd.discover(record, cart.replace(k=17.6))
-    assert found.verdict == "nothing missing"
+    discovery = udd.discover(record, cart.replace(k=17.6))
+    assert discovery.verdict == "nothing missing"

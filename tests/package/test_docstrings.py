@@ -61,12 +61,12 @@ def resolved(name: str) -> Any:
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
         try:
-            found: Any = importlib.import_module(".".join(parts[:count]))
+            answer: Any = importlib.import_module(".".join(parts[:count]))
         except ImportError:
             continue
         for part in parts[count:]:
-            found = getattr(found, part)
-        return found
+            answer = getattr(answer, part)
+        return answer
     raise AttributeError(name)
 
 

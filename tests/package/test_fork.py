@@ -43,8 +43,8 @@ def work(_=0):
         return {WORK[name]}
 before = work()
 with multiprocessing.get_context("fork").Pool(2) as pool:
-    found = pool.map_async(work, range(2)).get(20)
-assert found == [before, before], (before, found)
+    results = pool.map_async(work, range(2)).get(20)
+assert results == [before, before], (before, results)
 assert work() == before
 print("done")
 """

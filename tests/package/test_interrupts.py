@@ -96,8 +96,8 @@ import udd.sweeps.run_sweep, tqdm
 spec = udd.SweepSpec("lyapunov", udd.DLE(1.0), {"w": np.linspace(1, 2, 9999)}, chunk=100)
 """
     after = """
-found = stopped.partial
-assert found["outcome"].shape == (9999,) and found is stopped.partial and (found["outcome"] == -1).any()
+partial = stopped.partial
+assert partial["outcome"].shape == (9999,) and partial is stopped.partial and (partial["outcome"] == -1).any()
 """
     wall, xarray = answer(setup, "udd.sweep(spec)", after)
     assert wall < 0.2 and not xarray

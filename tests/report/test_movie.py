@@ -35,8 +35,8 @@ def test_frames_are_found_by_their_time(filmed: tuple[Path, udd.Measurement]) ->
     film, _ = filmed
     for rows in ([0, 1, 7], [262, 263, 270, 299]):  # before and behind the second key frame
         # Times that are not quite those of the frames, as a tracker's are not.
-        found = list(pictures_between(film, 0.04 * np.array(rows) + 0.003))
-        for a, b in zip(found, pictures_at(film, rows), strict=True):
+        results = list(pictures_between(film, 0.04 * np.array(rows) + 0.003))
+        for a, b in zip(results, pictures_at(film, rows), strict=True):
             np.testing.assert_array_equal(a, b)
 
 

@@ -68,8 +68,8 @@ class Page(HTMLParser):
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("pages")
     results = {"disk": discovered.disk(), "nothing": discovered.nothing(), "pendulum": discovered.pendulum()}
-    for name, found in results.items():
-        found.report(folder / f"{name}.html", command=f"udd discover {name}.csv <&>")
+    for name, result in results.items():
+        result.report(folder / f"{name}.html", command=f"udd discover {name}.csv <&>")
     return {name: (folder / f"{name}.html").read_text(encoding="utf-8") for name in results}
 
 
@@ -116,12 +116,12 @@ def test_the_held_out_frames_are_described(
 
 
 def test_an_effect_has_words_and_numbers(pages: dict[str, str]) -> None:
-    found, text = discovered.disk(), Page(pages["disk"]).words
-    (effect,) = found.effects
+    result, text = discovered.disk(), Page(pages["disk"]).words
+    (effect,) = result.effects
     assert effect.effect.meaning[1:] in text
     assert words.with_error(effect.parameters["b"], effect.errors["b"]) in text
-    for h in found.error_before.horizons:
-        assert words.length(found.error_after.at(h)[0], "m") in text
+    for h in result.error_before.horizons:
+        assert words.length(result.error_after.at(h)[0], "m") in text
     else_ = text[text.rindex("Alternatives") : text.rindex("Limits of these data")]
     assert "Slip c Z" in else_
     assert "film a second drive" in text
@@ -148,8 +148,8 @@ def test_the_page_follows_the_reader(pages: dict[str, str]) -> None:
 
 
 def test_whiteness_before_and_after_is_told(pages: dict[str, str]) -> None:
-    found = discovered.disk()
-    before, after = innovations(found.baseline), innovations(found.fit)
+    result = discovered.disk()
+    before, after = innovations(result.baseline), innovations(result.fit)
     rows = tables.whiteness([before, after])
     assert [row["square"] for row in rows[::2]] == [f"{x:.3g}" for x in before.chi2]
     text = Page(pages["disk"]).words
@@ -161,16 +161,16 @@ def test_whiteness_before_and_after_is_told(pages: dict[str, str]) -> None:
 def test_the_motion_moves(pages: dict[str, str], name: str) -> None:
     """The moving drawing turns what was measured as it was measured, at half its speed."""
     results = {"disk": discovered.disk, "nothing": discovered.nothing, "pendulum": discovered.pendulum}
-    found = results[name]()
+    result = results[name]()
     drawn = [i for i in Page(pages[name]).all("img") if (i["alt"] or "").startswith("A moving picture")]
     assert len(drawn) == 1
     uri = drawn[0]["src"] or ""
     drawing = ElementTree.fromstring(base64.b64decode(uri.partition("base64,")[2]))
     moves = drawing.findall(".//{*}animateTransform")
     turns = [m for m in moves if m.attrib["type"] == "rotate"]
-    panels = 1 + 1 + bool(found.effects)
+    panels = 1 + 1 + bool(result.effects)
     assert len(turns) == panels
-    times, seen, _ = runs.side_by_side(found, 6.0 if name != "pendulum" else 12.0)
+    times, seen, _ = runs.side_by_side(result, 6.0 if name != "pendulum" else 12.0)
     assert {m.attrib["dur"] for m in moves} == {f"{2 * (times[-1] - times[0]):g}s"}
     angle = np.degrees(seen[:, -1] if name != "pendulum" else -seen[:, 0])
     shown = np.array([float(x) for x in turns[0].attrib["values"].split(";")])
@@ -294,9 +294,9 @@ def test_small_chances() -> None:
 
 def test_what_no_library_holds_is_told_by_its_curve(tmp_path: Path) -> None:
     """A torque with seven waves per turn: the page says along what, and shows the curve."""
-    found = discovered.outside()
-    assert found.effects and found.effects[0].curve is not None
-    found.report(tmp_path / "page.html")
+    result = discovered.outside()
+    assert result.effects and result.effects[0].curve is not None
+    result.report(tmp_path / "page.html")
     page = Page((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert "depending on the orientation β" in page.words
     assert "torque as a function of beta, with its band" in [image["alt"] for image in page.all("img")]
@@ -350,10 +350,10 @@ def test_effects_that_act_identically_have_equal_bars() -> None:
 
 
 def test_the_origin_of_a_film_is_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, origin = discovered.disk(), "This film was rendered <here>."
-    rendered = found.measurement.with_meta(origin=origin)
-    monkeypatch.setattr(type(found), "measurement", property(lambda _: rendered))
-    assert origin in [str(note.text) for note in head_of(found, "", []).notes]
+    result, origin = discovered.disk(), "This film was rendered <here>."
+    rendered = result.measurement.with_meta(origin=origin)
+    monkeypatch.setattr(type(result), "measurement", property(lambda _: rendered))
+    assert origin in [str(note.text) for note in head_of(result, "", []).notes]
 
 
 def test_errors_of_the_known_model_contain_what_it_lacks() -> None:

@@ -12,8 +12,8 @@ from udd.report.document import Bullets, Column, Head, Number, Paragraph, Report
 
 @pytest.mark.parametrize("made", [discovered.disk, discovered.nothing, discovered.pendulum])
 def test_the_terminal_and_the_page_have_one_report(made):
-    found = made()
-    page, summary = report_of(found), summary_of(found)
+    result = made()
+    page, summary = report_of(result), summary_of(result)
     assert summary.head == page.head
     sections = {section.heading: section.parts for section in page.sections}
     for section in summary.sections:
@@ -22,9 +22,9 @@ def test_the_terminal_and_the_page_have_one_report(made):
     text = as_text(page)
     assert text.isascii()
     assert "<" not in text.replace("<=", "").replace("< ", "")
-    assert text.splitlines()[0].startswith(f"{found.verdict}: ")
+    assert text.splitlines()[0].startswith(f"{result.verdict}: ")
     assert set(as_text(summary).splitlines()) <= set(text.splitlines())
-    for name in found.fit.parameters:
+    for name in result.fit.parameters:
         own = name.rpartition(".")[2]
         assert any(line.split()[:1] == [own] for line in text.splitlines()), name
 

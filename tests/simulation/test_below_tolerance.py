@@ -54,8 +54,8 @@ def test_a_population_that_is_lost_below_atol_is_said(call: Callable[[], object]
 
 
 def test_a_smaller_atol_is_right_and_silent() -> None:
-    found = udd.poincare(PREY, n=3, state0=START, transient=0, atol=1e-40)
-    assert found.return_times == pytest.approx(period(), rel=1e-6)
+    section = udd.poincare(PREY, n=3, state0=START, transient=0, atol=1e-40)
+    assert section.return_times == pytest.approx(period(), rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -18,18 +18,18 @@ ALL = ("dopri5", "dop853", "taylor", "rodas", "auto")
 
 
 def crossed(model: udd.Model, section: str, n: int, start: list[float], **options: Any) -> Any:
-    found = udd.poincare(model, section, n, state0=start, transient=0, **options)
-    assert found.outcome == "finished"
-    return found.t
+    result = udd.poincare(model, section, n, state0=start, transient=0, **options)
+    assert result.outcome == "finished"
+    return result.t
 
 
 def ends(model: udd.Model, length: float, start: list[float]) -> dict[str, float]:
     """The first state at the end, by every method and in an ensemble."""
     times = np.arange(0.0, length + 0.025, 0.05)
-    found = {how: float(udd.simulate(model, times, start, method=how).state[-1, 0]) for how in ALL}
+    results = {how: float(udd.simulate(model, times, start, method=how).state[-1, 0]) for how in ALL}
     many = udd.ensemble(model, length, [start, start]).end[:, 0]
     assert many[0] == many[1]
-    return {**found, "ensemble": float(many[0])}
+    return {**results, "ensemble": float(many[0])}
 
 
 def test_a_section_of_a_turning_rotor_is_crossed_once_in_each_turn() -> None:
@@ -39,8 +39,8 @@ def test_a_section_of_a_turning_rotor_is_crossed_once_in_each_turn() -> None:
     assert crossed(model, "sin(theta)", 5, [1.0, 3.0], direction="up") == pytest.approx(right, abs=1e-6)
     fast = udd.Model(["theta"], ["50"], angles=["theta"])
     right = (np.pi * np.arange(1, 401) - 1) / 50
-    found = crossed(fast, "sin(theta)", 400, [1.0], direction="both")
-    assert found == pytest.approx(right, abs=1e-9)
+    result = crossed(fast, "sin(theta)", 400, [1.0], direction="both")
+    assert result == pytest.approx(right, abs=1e-9)
 
 
 @pytest.mark.parametrize("law", ["1", "0", "-y/1000"])
@@ -55,8 +55,8 @@ def test_a_strobe_is_seen_whatever_the_solution_does(law: str) -> None:
 
 def test_every_zero_of_a_cubic_within_one_step_is_seen() -> None:
     model = udd.Model(["y"], ["3*(t-8)^2 + 12*(t-8) - 4"])
-    found = crossed(model, "y", 3, [-120.0], direction="both")
-    assert found == pytest.approx([2, 6, 10], abs=1e-8)
+    result = crossed(model, "y", 3, [-120.0], direction="both")
+    assert result == pytest.approx([2, 6, 10], abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -72,8 +72,8 @@ def test_zeros_that_lie_close_within_a_long_step_are_seen(zeros: list[float]) ->
     law = " + ".join(f"({c!r})*t^{k}" for k, c in enumerate(curve.deriv().coef.tolist()))
     model, start = udd.Model(["y"], [law]), [float(curve(0.0))]
     more = {"rtol": 1e-12, "atol": 1e-14, "t_max": zeros[-1] + 1e-3}
-    found = crossed(model, "y", len(zeros), start, direction="both", **more)
-    assert found == pytest.approx(zeros, abs=1e-6)
+    result = crossed(model, "y", len(zeros), start, direction="both", **more)
+    assert result == pytest.approx(zeros, abs=1e-6)
 
 
 @pytest.mark.parametrize("near", [0.998, 0.99999, 1 - 1e-8])
@@ -81,15 +81,15 @@ def test_a_section_near_a_crest_is_crossed_twice_at_each(near: float) -> None:
     model = udd.Model(["x", "v"], ["v", "-x"])
     before = np.arccos(np.sqrt(near))
     right = np.sort([np.pi * k + s * before for k in range(5) for s in (1, -1)])[1:9]
-    found = crossed(model, f"x^2 = {near!r}", 8, [1.0, 0.0], direction="both", rtol=1e-13, atol=1e-15)
-    assert found == pytest.approx(right, abs=1e-12 / before)
+    result = crossed(model, f"x^2 = {near!r}", 8, [1.0, 0.0], direction="both", rtol=1e-13, atol=1e-15)
+    assert result == pytest.approx(right, abs=1e-12 / before)
 
 
 def test_a_surface_that_is_only_touched_is_not_crossed() -> None:
     model = udd.Model(["y"], ["1"])
     with pytest.warns(udd.errors.IncompleteWarning):
-        found = udd.poincare(model, "(t - 3)^2", 1, state0=[0.0], transient=0, direction="both", t_max=50.0)
-    assert found.found == 0
+        result = udd.poincare(model, "(t - 3)^2", 1, state0=[0.0], transient=0, direction="both", t_max=50.0)
+    assert result.found == 0
 
 
 def test_pulses_into_a_slow_circuit_are_felt_by_every_method() -> None:
@@ -163,8 +163,8 @@ def test_sections_of_tiny_orbits_are_as_accurate_as_of_others(size: float) -> No
     model = udd.Model(["x", "v"], ["v", "-x"])
     for start in ([size, 0.0], [0.0, -size]):
         first = np.pi * (0.5 if start[0] else 1.0)
-        found = crossed(model, "x", 8, start, direction="both")
-        assert found == pytest.approx(first + np.pi * np.arange(8), abs=1e-7)
+        result = crossed(model, "x", 8, start, direction="both")
+        assert result == pytest.approx(first + np.pi * np.arange(8), abs=1e-7)
 
 
 def test_the_section_of_an_angle_that_runs_on_says_what_to_ask() -> None:
@@ -198,8 +198,8 @@ def test_the_shared_cases(shared: Path) -> None:
     for name, case in cases.items():
         model = udd.Model(case["states"], case["equations"], angles=case.get("angles", ()))
         if "section" in case:
-            found = crossed(model, case["section"], case["n"], case["start"], direction=case["direction"])
-            assert found == pytest.approx(case["times"], abs=2e-6), name
+            result = crossed(model, case["section"], case["n"], case["start"], direction=case["direction"])
+            assert result == pytest.approx(case["times"], abs=2e-6), name
         else:
             for how, x in ends(model, case["t_end"], case["start"]).items():
                 assert x == pytest.approx(case["x_end"], abs=1e-6), (name, how)

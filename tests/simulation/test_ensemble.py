@@ -13,13 +13,13 @@ STARTS = np.random.default_rng(3).normal(size=(4, 5, 3))
 @pytest.mark.parametrize("method", ["taylor", "dopri5", "dop853"])
 def test_its_runs_are_those_of_simulate(method):
     times = np.array([0.0, 2.0, 9.0])
-    found = udd.ensemble(udd.DLE(1.0), times, STARTS, method=method)
-    assert found.state.shape == (4, 5, 3, 3)
-    assert (found.outcome == "finished").all()
+    result = udd.ensemble(udd.DLE(1.0), times, STARTS, method=method)
+    assert result.state.shape == (4, 5, 3, 3)
+    assert (result.outcome == "finished").all()
     for i, j in ((0, 0), (3, 4)):
         single = udd.simulate(udd.DLE(1.0), times, STARTS[i, j], method=method)
-        np.testing.assert_array_equal(found.state[i, j], single.state)
-    np.testing.assert_array_equal(found.end, found.state[..., -1, :])
+        np.testing.assert_array_equal(result.state[i, j], single.state)
+    np.testing.assert_array_equal(result.end, result.state[..., -1, :])
 
 
 def test_the_number_of_threads_changes_no_bit():
@@ -29,10 +29,10 @@ def test_the_number_of_threads_changes_no_bit():
 
 
 def test_parameters_vary():
-    found = udd.ensemble(udd.DLE(1.0), 5.0, [1.0, 1.0, 0.01], parameters={"w": [0.5, 1.0, 2.0]})
-    assert found.state.shape == (3, 1, 3)
+    result = udd.ensemble(udd.DLE(1.0), 5.0, [1.0, 1.0, 0.01], parameters={"w": [0.5, 1.0, 2.0]})
+    assert result.state.shape == (3, 1, 3)
     alone = udd.ensemble(udd.DLE(2.0), 5.0, [1.0, 1.0, 0.01])
-    np.testing.assert_array_equal(found.end[2], alone.end)
+    np.testing.assert_array_equal(result.end[2], alone.end)
 
 
 def test_average_of_the_ensemble_is_the_exact_one():
@@ -47,12 +47,12 @@ def test_a_disk_that_leaves_says_so():
     disk = udd.Disk(0.045)
     # The first leaves after 5.8 s, before chaos could decide; the other rests above the axle.
     starts = np.array([[3.832, -0.003, -0.002, 0.0], [0.0, 0.0, 0.0, 0.0]])
-    found = udd.ensemble(disk, np.linspace(0.0, 10.0, 5), starts)
-    assert "ejected" in found.outcome
-    left = found.outcome == "ejected"
-    np.testing.assert_allclose(np.hypot(found.end[left, 1], found.end[left, 2]), disk.R, rtol=1e-9)
-    assert np.isnan(found.state[left, -1]).all()
-    assert (found.t_end[left] < 10.0).all()
+    result = udd.ensemble(disk, np.linspace(0.0, 10.0, 5), starts)
+    assert "ejected" in result.outcome
+    left = result.outcome == "ejected"
+    np.testing.assert_allclose(np.hypot(result.end[left, 1], result.end[left, 2]), disk.R, rtol=1e-9)
+    assert np.isnan(result.state[left, -1]).all()
+    assert (result.t_end[left] < 10.0).all()
 
 
 @pytest.mark.parametrize(

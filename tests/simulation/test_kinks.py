@@ -75,10 +75,10 @@ def test_more_kinks_than_surfaces_are_compared() -> None:
 
 
 def test_the_spectrum_of_chuas_circuit() -> None:
-    found = udd.lyapunov_spectrum(chua(), state0=[0.1, 0.0, 0.0], t=400.0, tol=0.1)
+    spectrum = udd.lyapunov_spectrum(chua(), state0=[0.1, 0.0, 0.0], t=400.0, tol=0.1)
     # A flow has one that vanishes; the largest was 0.326 +- 0.004 by the core without kinks (8 s).
-    assert abs(found.exponents[1]) < 0.02
-    assert 0.1 < found.exponents[0] < 0.5
+    assert abs(spectrum.exponents[1]) < 0.02
+    assert 0.1 < spectrum.exponents[0] < 0.5
 
 
 def test_values() -> None:

@@ -99,12 +99,12 @@ def test_inputs_of_many_states() -> None:
 def test_equilibria_of_many_states() -> None:
     """F in every component is Lorenz's equilibrium; its eigenvalues are those of a circulant matrix."""
     n = 7
-    found = [e for e in udd.equilibria(ring(n)) if np.allclose(e.state, 8.0)]
-    assert len(found) == 1 and found[0].state.shape == (n,)
+    results = [e for e in udd.equilibria(ring(n)) if np.allclose(e.state, 8.0)]
+    assert len(results) == 1 and results[0].state.shape == (n,)
     k = 2.0 * np.pi * np.arange(n) / n
     wanted = 8.0 * (np.exp(1j * k) - np.exp(-2j * k)) - 1.0
     np.testing.assert_allclose(
-        np.sort_complex(np.round(found[0].eigenvalues, 9)), np.sort_complex(np.round(wanted, 9)), atol=1e-7
+        np.sort_complex(np.round(results[0].eigenvalues, 9)), np.sort_complex(np.round(wanted, 9)), atol=1e-7
     )
 
 

@@ -65,8 +65,8 @@ def test_a_law_that_levels_off_on_both_sides_of_a_step() -> None:
 def test_auto_goes_where_no_series_can() -> None:
     # All derivatives of exp(-1/t) vanish at t = 0, where 1/t is infinite.
     law = udd.Model(["x"], ["exp(-1/t)*sin(x)"])
-    found = [udd.simulate(law, [0, 2], [1.0], method=m).state[-1, 0] for m in ("auto", "dop853", "dopri5")]
-    np.testing.assert_allclose(found, found[1], rtol=1e-8)
+    results = [udd.simulate(law, [0, 2], [1.0], method=m).state[-1, 0] for m in ("auto", "dop853", "dopri5")]
+    np.testing.assert_allclose(results, results[1], rtol=1e-8)
     with pytest.raises(IntegrationError, match="no power series serves at t = 0"):
         udd.simulate(law, [0, 2], [1.0], method="taylor")
 
@@ -81,9 +81,9 @@ def test_ensembles_sections_and_exponents_hand_over_too() -> None:
     assert (runs.outcome == "finished").all()
     np.testing.assert_allclose(runs.state[:, -1, 0], np.sqrt(np.square(starts)[:, 0] + 0.1), rtol=1e-7)
     for x in (1e-12, 1e-6, 0.1):
-        found = udd.poincare(POLE, "x - 1", 1, state0=[x, 0.3], transient=0)
-        assert found.outcome == "finished"
-        np.testing.assert_allclose(found.t, (1 - x**2) / 2, rtol=1e-7)
+        section = udd.poincare(POLE, "x - 1", 1, state0=[x, 0.3], transient=0)
+        assert section.outcome == "finished"
+        np.testing.assert_allclose(section.t, (1 - x**2) / 2, rtol=1e-7)
 
 
 def test_pieces_of_orbits_hand_over_too() -> None:
@@ -184,14 +184,14 @@ def differing(seed: int) -> str | None:
     if not doubt < 1e-5:
         return ""
     for method in METHODS:
-        found = ended(law, end, start, method=method)
-        if isinstance(found, str):
-            if method == "auto" and found == "failed":
-                return f"{method} {found}"
+        result = ended(law, end, start, method=method)
+        if isinstance(result, str):
+            if method == "auto" and result == "failed":
+                return f"{method} {result}"
             continue
         # So many steps' errors, and what they grow to on the way.
-        if not np.max(np.abs(found - fine) / size) < 1e-6 + 1e3 * doubt:
-            return f"{method}: {found} instead of {fine}, doubt {doubt:.1e}"
+        if not np.max(np.abs(result - fine) / size) < 1e-6 + 1e3 * doubt:
+            return f"{method}: {result} instead of {fine}, doubt {doubt:.1e}"
     return None
 
 

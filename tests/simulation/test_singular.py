@@ -35,17 +35,17 @@ def oscillator() -> udd.Discovery:
 
 
 def test_an_alternative_whose_name_the_model_has_is_told_apart():
-    found = oscillator()
-    names = [f.effect.name for f in found.effects]
+    result = oscillator()
+    names = [f.effect.name for f in result.effects]
     assert "wave_in_v" in names and len(names) > 1
     other = next(name for name in names if name != "wave_in_v")
     # Another wave could replace the drag, but the model has a wave already.
-    (wave,) = [c.effect for c in waves(found.baseline.model, [0.7]) if c.effect.name == "wave_in_v"]
+    (wave,) = [c.effect for c in waves(result.baseline.model, [0.7]) if c.effect.name == "wave_in_v"]
     title, equation = "a wave", wave.equation
     doubt = Alternative(other, wave.replace(a=0.1, b=0.1), title, equation, nats=1.0, likeness=0.5)
-    doubted = replace(found, alternatives=[doubt])
+    doubted = replace(result, alternatives=[doubt])
     assert len(hints(doubted)) >= 1
-    assert renamed(wave, found.model).name == "wave_in_v_2"
+    assert renamed(wave, result.model).name == "wave_in_v_2"
     # The library's own have one name, and are in a model but once.
     disk = discovered.disk()
     assert renamed(disk.effects[0].effect, disk.model) is None

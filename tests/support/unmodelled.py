@@ -19,11 +19,11 @@ K0, K1, K2, R, G = 0.012, 0.103, 0.055, 0.08, 9.81
 
 @dataclass(frozen=True)
 class Case:
-    """A law and where it ought to be found: first where it is, then where a weak one may as well be."""
+    """A law and where it should be located: first where it is, then where a weak one may as well be."""
 
     name: str
     law: Law
-    found: tuple[tuple[str, ...], ...]
+    places: tuple[tuple[str, ...], ...]
     curve: Callable[[np.ndarray], np.ndarray]
 
 

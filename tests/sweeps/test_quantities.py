@@ -17,7 +17,7 @@ def quantity(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def _found(quantity: str, model: udd.Disk | udd.DLE, parameter: str, values: list[float], threads: int):
+def _computed(quantity: str, model: udd.Disk | udd.DLE, parameter: str, values: list[float], threads: int):
     asked = QUANTITIES[quantity]
     rows = parameter_batch(model, {parameter: values}).rows()
     states = np.tile(default_state(model), (len(values), 1))
@@ -25,18 +25,18 @@ def _found(quantity: str, model: udd.Disk | udd.DLE, parameter: str, values: lis
 
 
 def test_a_quantity_gives_what_it_lists(quantity: str) -> None:
-    variables, found = _found(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 1)
-    assert set(found) == {v.name for v in variables} | {"outcome"}
+    variables, result = _computed(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 1)
+    assert set(result) == {v.name for v in variables} | {"outcome"}
     for variable in variables:
-        assert found[variable.name].shape == (3, *(length for _, length in variable.dimensions))
-        assert found[variable.name].dtype == np.dtype(variable.dtype)
-        assert np.isfinite(found[variable.name]).all()
-    assert (found["outcome"] == FINISHED).all()
+        assert result[variable.name].shape == (3, *(length for _, length in variable.dimensions))
+        assert result[variable.name].dtype == np.dtype(variable.dtype)
+        assert np.isfinite(result[variable.name]).all()
+    assert (result["outcome"] == FINISHED).all()
 
 
 def test_a_quantity_has_the_same_bits_on_one_thread_and_on_two(quantity: str) -> None:
-    _, one = _found(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 1)
-    _, two = _found(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 2)
+    _, one = _computed(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 1)
+    _, two = _computed(quantity, udd.DLE(1.0), "w", [0.5, 1.0, 4.0], 2)
     for name, values in one.items():
         np.testing.assert_array_equal(values, two[name])
 
@@ -47,9 +47,9 @@ def test_an_orbit_that_leaves_disturbs_no_other(quantity: str) -> None:
     asked, states = QUANTITIES[quantity], np.tile([0.0, 1e-3, 0.0, 0.0], (3, 1))
     rows = parameter_batch(disk, {"W": [0.03, 0.03, 0.03]}).rows()
     states[1, 1] = 0.09
-    found = asked.run(disk, rows, states, asked.options(disk, {"t": 2.0}), 1)
-    assert found["outcome"][1] == EJECTED
-    for values in found.values():
+    result = asked.run(disk, rows, states, asked.options(disk, {"t": 2.0}), 1)
+    assert result["outcome"][1] == EJECTED
+    for values in result.values():
         np.testing.assert_array_equal(values[0], values[2])
 
 

@@ -22,9 +22,9 @@ zarr = pytest.importorskip("zarr", reason="sweeps need the extra 'scale'")
 # --- what is computed
 
 
-def named(found: Any) -> dict[int, str]:
+def named(answer: Any) -> dict[int, str]:
     """The outcomes' meanings."""
-    about = found["outcome"].attrs
+    about = answer["outcome"].attrs
     return dict(zip(about["flag_values"], about["flag_meanings"].split(), strict=True))
 
 
@@ -82,9 +82,9 @@ def test_a_solution_that_blows_up_is_an_outcome() -> None:
     # Its rate is beyond the largest number.
     over = {"Omega": [1.0, 1e308]}
     model = udd.Pendulum(0.5, k0=100.0)
-    found = udd.sweep(udd.SweepSpec("outcome", model, over, [1.0, 1.0], {"t": 1.0}))
-    assert [named(found)[k] for k in found["outcome"].values] == ["finished", "failed"]
-    assert np.isnan(found["t_end"].values).tolist() == [False, True]
+    swept = udd.sweep(udd.SweepSpec("outcome", model, over, [1.0, 1.0], {"t": 1.0}))
+    assert [named(swept)[k] for k in swept["outcome"].values] == ["finished", "failed"]
+    assert np.isnan(swept["t_end"].values).tolist() == [False, True]
 
 
 def test_a_disk_that_is_nowhere_on_the_wheels_is_not_run() -> None:
@@ -125,10 +125,10 @@ def test_exponents_over_two_parameters_and_a_state() -> None:
 
 def test_spectra_add_up_to_the_divergence() -> None:
     over = {"B": [0.0, 0.1], "w": [1.0, 2.0, 3.0]}
-    found = udd.sweep(udd.SweepSpec("spectrum", udd.DLE(1.0), over, options={"t": 500.0}, chunk=4))
-    assert found["value"].dims == ("B", "w", "number")
+    swept = udd.sweep(udd.SweepSpec("spectrum", udd.DLE(1.0), over, options={"t": 500.0}, chunk=4))
+    assert swept["value"].dims == ("B", "w", "number")
     # The tangents' volume shrinks at the rate 1 + B w at every moment; left is the integrator's error.
-    off = found["value"].sum("number") + 1 + found["B"] * found["w"]
+    off = swept["value"].sum("number") + 1 + swept["B"] * swept["w"]
     assert float(abs(off).max()) < 1e-6
 
 

@@ -75,8 +75,8 @@ def test_every_executor_gives_the_same_bytes(
 
 def test_a_group_will_do_as_a_store() -> None:
     root = zarr.create_group(zarr.storage.MemoryStore())
-    found = udd.sweep(disk_spec(), store=root.create_group("disk"))
-    assert found.identical(udd.sweep(disk_spec()))
+    swept = udd.sweep(disk_spec(), store=root.create_group("disk"))
+    assert swept.identical(udd.sweep(disk_spec()))
     with pytest.raises(UddError, match="holds other data already"):
         udd.sweep(disk_spec(), store=root)
 
@@ -218,9 +218,9 @@ class Sickly(ThreadPoolExecutor):
 def test_a_chunk_whose_worker_died_is_handed_over_again() -> None:
     spec = disk_spec()
     with Sickly({0: 1, 3: 2}) as workers:
-        found = udd.sweep(spec, workers)
+        swept = udd.sweep(spec, workers)
         assert workers.count == 12 + 3
-    assert found.identical(udd.sweep(spec))
+    assert swept.identical(udd.sweep(spec))
 
 
 def test_a_chunk_that_kills_every_worker_is_given_up_and_the_rest_kept() -> None:
@@ -317,9 +317,9 @@ def test_the_command_with_a_dask_cluster(tmp_path: Path) -> None:
     assert done.returncode == 0
     # A slow machine says how far it is, nothing else.
     assert all(line.startswith("udd: sweep") for line in done.stderr.splitlines()), done.stderr
-    found = xr.open_zarr(tmp_path / "killed.zarr", consolidated=False, chunks=None)
-    assert found["final_Y"].equals(udd.sweep(spec)["final_Y"])
-    finished, ejected = (int((found["outcome"] == value).sum()) for value in (0, 1))
+    answer = xr.open_zarr(tmp_path / "killed.zarr", consolidated=False, chunks=None)
+    assert answer["final_Y"].equals(udd.sweep(spec)["final_Y"])
+    finished, ejected = (int((answer["outcome"] == value).sum()) for value in (0, 1))
     assert finished + ejected == 72
     said = f"final_state over W, relaxation.b, Z: {finished} finished, {ejected} ejected\n"
     assert done.stdout.startswith(said)

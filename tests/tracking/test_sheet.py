@@ -42,8 +42,8 @@ def squares(commands: str) -> list[tuple[float, float, float]]:
     out = []
     number = r"(-?[\d.]+)"
     path = rf"{number} {number} m\n{number} {number} l\n{number} {number} l\n{number} {number} l\nh\n"
-    for found in re.findall(path, commands):
-        at = np.array(found, float).reshape(4, 2) / MM
+    for result in re.findall(path, commands):
+        at = np.array(result, float).reshape(4, 2) / MM
         if np.isclose(np.ptp(at[:, 0]), np.ptp(at[:, 1]), atol=1e-3):
             out.append((*at.mean(axis=0), float(np.ptp(at[:, 0]))))
     return out

@@ -307,15 +307,15 @@ def a_look(mark: Mark) -> DiskAppearance:
 def test_a_half_hidden_mark_is_not_taken_for_a_whole_one(hide: float | None) -> None:
     truth = 0.4 - 0.3j
     picture, view, mark = a_mark(truth, hide)
-    found, complete = 0j, 0.0
+    result, complete = 0j, 0.0
     for _ in range(6):
-        pose = Pose(40 + 40j + found, 0.0)
+        pose = Pose(40 + 40j + result, 0.0)
         s = locate(np.round(picture).astype(np.uint8), view, a_look(mark), pose, Blur())[1][0]
         assert s is not None
-        found, complete = found + complex(s.offset[0], s.offset[1]), s.complete
+        result, complete = result + complex(s.offset[0], s.offset[1]), s.complete
     # rounding to whole codes is 0.3 of 120: a thousandth of a pixel on some forty edge pixels; a centroid
     # of the visible part would be off by 2 to 7 pixels
-    assert abs(found - truth) < 0.01
+    assert abs(result - truth) < 0.01
     if hide is None:
         assert complete == pytest.approx(1.0, abs=1e-6)
     else:
@@ -370,11 +370,11 @@ def test_lens_and_tilt_come_out_of_rigidity() -> None:
     noisy[::3, 1] = np.nan
     bent = calibrate(noisy, (700, 550))
     assert bent.is_significant
-    found = bent.lens
+    result = bent.lens
     # the standard error of the curve covers, to 4 of them
-    assert 0 < bent.sigma[0] < 0.01 and abs(found.curve - true_lens.curve) < 4 * bent.sigma[0]
+    assert 0 < bent.sigma[0] < 0.01 and abs(result.curve - true_lens.curve) < 4 * bent.sigma[0]
     # the distances between the marks, in the frames' own unit of length, must be the same everywhere again
-    back = found.plane(points)
+    back = result.plane(points)
     spread = np.abs(back[:, 0] - back[:, 2])
     before = np.abs(points[:, 0] - points[:, 2])
     assert spread.std() < 0.15 * before.std() and spread.std() < 0.1
@@ -418,11 +418,11 @@ def test_contact_from_exact_kinematics() -> None:
     rng = np.random.default_rng(0)
     centre = np.asarray(1000 * (state[:, 0] - 1j * state[:, 1]) + (300 + 200j))
     noisy = centre + 0.02 * (rng.normal(size=150) + 1j * rng.normal(size=150))
-    found = pivot(t, noisy.astype(np.complex128), state[:, 2], np.ones(150, dtype=bool), 60.0)
-    assert found is not None
+    result = pivot(t, noisy.astype(np.complex128), state[:, 2], np.ones(150, dtype=bool), 60.0)
+    assert result is not None
     # noise of 0.02 pixel over 150 frames, times about 2 for the free constants and drive
-    assert abs(found.place - (300 + 200j)) < 0.02
-    assert np.conj(found.drive) / 1000 == pytest.approx(0.01j, abs=2e-4)
+    assert abs(result.place - (300 + 200j)) < 0.02
+    assert np.conj(result.drive) / 1000 == pytest.approx(0.01j, abs=2e-4)
 
 
 def test_steady_rotation_gives_no_contact() -> None:

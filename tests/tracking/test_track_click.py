@@ -97,15 +97,15 @@ def test_a_click_is_refined_to_its_patch(made: Made) -> None:
         if picture.index % 4:
             continue
         for z, mark in zip(places(made, THREE, picture.index)[1], THREE, strict=True):
-            found = patch(picture, near(z), film.full_range)
-            if found is None:
+            spot = patch(picture, near(z), film.full_range)
+            if spot is None:
                 continue  # behind the support
-            refined += found.refined
-            if found.refined:
-                off.append(abs(found.centre - z))
+            refined += spot.refined
+            if spot.refined:
+                off.append(abs(spot.centre - z))
                 # the colour, by its direction: the layout's own one
                 own = read_layout(THREE).colours[THREE.index(mark)]
-                said = Layout((0j, 1 + 0j), (own, found.colour)).chroma
+                said = Layout((0j, 1 + 0j), (own, spot.colour)).chroma
                 unit = said / np.hypot(*said.T)[:, None]
                 assert unit[0] @ unit[1] > 0.98
     assert refined > 20
@@ -126,15 +126,15 @@ def test_what_is_hidden_or_grey_is_not_refined(made: Made) -> None:
     )  # a black bar before it
     v[(r + 3) // 2 :, c // 2 - 10 : c // 2 + 10] = 128
     covered = Picture(0, 0.0, y, u, v)
-    found = patch(covered, z - 1j, False)
-    assert found is not None and not found.refined and found.centre == z - 1j and found.sigma == CLICK
+    spot = patch(covered, z - 1j, False)
+    assert spot is not None and not spot.refined and spot.centre == z - 1j and spot.sigma == CLICK
     assert patch(covered, complex(-50, 3), False) is None
 
 
 def test_a_circle_through_clicks() -> None:
     turn = np.exp(1j * np.array([0.2, 1.9, 4.0]))
-    found = circle(100 + 80j + 70 * turn, 1.5)
-    assert found is not None and abs(found.centre - (100 + 80j)) < 1e-9 and abs(found.radius - 70) < 1e-9
+    fitted = circle(100 + 80j + 70 * turn, 1.5)
+    assert fitted is not None and abs(fitted.centre - (100 + 80j)) < 1e-9 and abs(fitted.radius - 70) < 1e-9
     rng, errors, sigma = np.random.default_rng(2), [], 0.0
     angles = np.exp(2j * np.pi * np.arange(6) / 6)
     for _ in range(300):
@@ -507,23 +507,23 @@ def test_a_scale_that_is_said_with_an_error_is_a_beginning() -> None:
     places = 1000 * layout.reach * layout.unit
     rim = Rim(0j, 80.0, 0.05, 0.05, 1000)
 
-    def found(shown: Rim | None = rim, **said: Any) -> Any:
+    def scaled(shown: Rim | None = rim, **said: Any) -> Any:
         return scale(places, shown, TrackOptions(layout=layout, **said))
 
-    given = found(scale=990.0)
+    given = scaled(scale=990.0)
     assert (given.value, given.sigma, given.origin) == (990.0, 0.0, "given")
     # exact to 4.4 pixels per metre by the rim, 10 by hand: weights of 5 to 1
     loose = Sigma(scale=10.0, layout=0.001)
-    both = found(scale=990.0, sigma=loose)
+    both = scaled(scale=990.0, sigma=loose)
     assert 1000 > both.value > 997 and both.sigma < 4.4 and both.origin == "rim, and given"
-    alone = found(None, scale=990.0, sigma=loose)
+    alone = scaled(None, scale=990.0, sigma=loose)
     assert (alone.value, alone.sigma, alone.origin) == (990.0, 10.0, "given")  # the film does not tell
-    kept = found(scale=990.0, sigma=loose, calibrate=Calibrate(scale=False))
+    kept = scaled(scale=990.0, sigma=loose, calibrate=Calibrate(scale=False))
     assert (kept.value, kept.sigma) == (990.0, 10.0)
     with pytest.warns(UserWarning, match=r"the film shows 1000\.0 pixels per metre"):
-        assert found(scale=700.0, sigma=loose).value == pytest.approx(1000, rel=1e-3)
+        assert scaled(scale=700.0, sigma=loose).value == pytest.approx(1000, rel=1e-3)
     apart = float(abs(places[0] - places[1])) / 1000
-    measured = found(apart=(1, 2, apart), scale=990.0, sigma=loose)
+    measured = scaled(apart=(1, 2, apart), scale=990.0, sigma=loose)
     assert measured.origin == "distance of two marks" and measured.value == pytest.approx(1000, rel=1e-3)
 
 

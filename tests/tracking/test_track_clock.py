@@ -38,10 +38,10 @@ def film(path: Path, theta: np.ndarray, rate: int) -> None:
 @pytest.mark.parametrize(("kind", "rounded"), [("mkv", True), ("mp4", False)])
 def test_a_container_that_rounds_times_to_ms_costs_nothing(tmp_path: Path, kind: str, rounded: bool):
     film(tmp_path / f"swing.{kind}", angles(60, 180), 60)
-    found = udd.track(tmp_path / f"swing.{kind}", bob="red", length=0.8)
-    assert np.abs(found.t - np.arange(180) / 60).max() < 1e-9
-    assert ("clock" in found.meta) == rounded
-    fitted = udd.fit(found, udd.Pendulum(0.8))
+    track = udd.track(tmp_path / f"swing.{kind}", bob="red", length=0.8)
+    assert np.abs(track.t - np.arange(180) / 60).max() < 1e-9
+    assert ("clock" in track.meta) == rounded
+    fitted = udd.fit(track, udd.Pendulum(0.8))
     assert not fitted.doubts.missing and fitted.errors["k0"] < 2e-3
     assert abs(fitted.parameters["k0"] - 0.01) < 3 * fitted.errors["k0"]
 

@@ -190,11 +190,11 @@ def test_a_disk_at_rest_shows_no_smaller_errors() -> None:
 def test_what_a_path_is_bent_by_has_errors_of_its_own() -> None:
     tracks, _ = rolled(np.random.default_rng(3), 0.01, 0.01, 0.0)
     own = np.tile(np.eye(3), (len(tracks), 1, 1))
-    found = to_mid_exposure(tracks, own, 0.04**2 / 12)
+    result = to_mid_exposure(tracks, own, 0.04**2 / 12)
     weights = np.array([-1 / 12, 4 / 3, -5 / 2, 4 / 3, -1 / 12]) / 24  # of a quartic's second derivative
     expected = ((np.array([0, 0, 1, 0, 0]) - weights) ** 2).sum()
     assert 1.2 < expected < 1.3
-    np.testing.assert_allclose(found[5:-5], expected * own[5:-5], atol=1e-9)
+    np.testing.assert_allclose(result[5:-5], expected * own[5:-5], atol=1e-9)
     np.testing.assert_array_equal(to_mid_exposure(tracks, own, 0.0), own)
 
 
@@ -202,9 +202,9 @@ def test_what_all_marks_share_is_seen_where_the_disk_jumps() -> None:
     camera = Camera(SCALE, 1.0, "given", PIVOT, 0.0, "given", 0.039j)
     tracks, off = rolled(np.random.default_rng(4), 0.01, 0.01, 0.02)
     own = covariance(tracks, LOOK)
-    found = common_mode_errors(tracks, own, camera)
-    assert 0.015 < np.median(found) < 0.025  # 80 frames tell it to a tenth
-    both = own + (found**2)[:, None, None] * np.diag([1.0, 1.0, 0.0])
+    result = common_mode_errors(tracks, own, camera)
+    assert 0.015 < np.median(result) < 0.025  # 80 frames tell it to a tenth
+    both = own + (result**2)[:, None, None] * np.diag([1.0, 1.0, 0.0])
     assert covers(off, own)[3] > 2.5
     assert abs(covers(off, both)[3] - 1) < 0.15
 
@@ -224,10 +224,10 @@ def test_slip_is_no_error_that_all_marks_share() -> None:
 def test_a_law_of_rolling_that_fails_is_no_noise(pivot: complex, drive: complex) -> None:
     # As where the wheels slip by a law of their own: no contact and no drive explain the motion.
     tracks, _ = rolled(np.random.default_rng(6), 0.01, 0.01, 0.0)
-    found = common_mode_errors(
+    result = common_mode_errors(
         tracks, covariance(tracks, LOOK), Camera(SCALE, 1.0, "given", pivot, 0.0, "given", drive)
     )
-    assert found.max() < 0.008  # by second differences alone 0.1
+    assert result.max() < 0.008  # by second differences alone 0.1
 
 
 def test_an_exposure_is_found_from_a_first_estimate_of_a_third() -> None:
@@ -246,8 +246,8 @@ def test_an_exposure_is_found_from_a_first_estimate_of_a_third() -> None:
             amount += mark.level * seen
         codes = np.searchsorted(LOOK.light, amount).astype(np.uint8)
         frames.append((codes, pose, lambda T, r=rate, s=spin: Motion(r * T, s * T)))
-    found = again(frames, 0.003, LOOK, np.ones((200, 200), dtype=bool))
-    assert found == pytest.approx(0.01, rel=0.03)  # codes are whole numbers, streaks ten pixels
+    result = again(frames, 0.003, LOOK, np.ones((200, 200), dtype=bool))
+    assert result == pytest.approx(0.01, rel=0.03)  # codes are whole numbers, streaks ten pixels
 
 
 def test_pixels_that_a_codec_copies_show_an_earlier_pose() -> None:

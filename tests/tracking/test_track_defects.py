@@ -120,9 +120,9 @@ def test_squares_of_blobs_with_and_without_a_mark(missing: int | None) -> None:
         Blobs(stray if k == missing else np.append(stray, at[k]), np.full(2 if k == missing else 3, 200.0))
         for k in range(len(COLOURS))
     ]
-    found = squares(patches, missing)
-    assert found and abs(found[0][1].centre - centre) < 1e-9
-    assert found[0][1].angle == pytest.approx(angle) and found[0][1].reach == pytest.approx(reach)
+    result = squares(patches, missing)
+    assert result and abs(result[0][1].centre - centre) < 1e-9
+    assert result[0][1].angle == pytest.approx(angle) and result[0][1].reach == pytest.approx(reach)
 
 
 def test_slow_motion_headers_can_be_overruled(tmp_path: Path) -> None:
@@ -185,5 +185,5 @@ def test_a_disk_that_leaps_inward_at_its_edge_has_gone() -> None:
     away = 0.04 + 0.039 * 0.9 * (t - t[-1]) + 0.0398  # m, up to its edge as fast as it can roll
     for k, gone in ((len(t) - 3, True), (len(t) // 2, False)):
         leapt = np.where(np.arange(len(t)) < k, away, away - 0.008)
-        found = left_the_wheels(t, np.column_stack([0 * t, leapt, 0 * t]), 0.08, 1e-5)
-        assert list(found) == list(gone & (np.arange(len(t)) >= k))
+        result = left_the_wheels(t, np.column_stack([0 * t, leapt, 0 * t]), 0.08, 1e-5)
+        assert list(result) == list(gone & (np.arange(len(t)) >= k))

@@ -53,10 +53,10 @@ def test_gravity_shows_the_clock_and_the_orientation(slower: float) -> None:
     _, angle, state = seen(t, 1)
     for turn in (1, 1j, -1):
         place = (state[:, 1] + 1j * state[:, 2]) * turn
-        found = apparent_gravity(slower * t, np.column_stack([place.real, place.imag, angle]), 0.08)
-        assert found is not None and found.is_known
-        assert found.slower == pytest.approx(slower, rel=0.05)  # a tenth makes a doubt
-        assert abs(np.angle(1j * found.value / turn)) < 0.05
+        gravity = apparent_gravity(slower * t, np.column_stack([place.real, place.imag, angle]), 0.08)
+        assert gravity is not None and gravity.is_known
+        assert gravity.slower == pytest.approx(slower, rel=0.05)  # a tenth makes a doubt
+        assert abs(np.angle(1j * gravity.value / turn)) < 0.05
 
 
 def test_turns_are_counted_across_gaps_or_in_doubt() -> None:
@@ -69,9 +69,9 @@ def test_turns_are_counted_across_gaps_or_in_doubt() -> None:
         place, turned = centre.copy(), angle.copy()
         place[k : k + gap], turned[k : k + gap] = complex(np.nan, np.nan), np.nan
         turned[k + gap :] += 2 * np.pi * random.integers(-2, 3)
-        found = count_turns(t, place, turned, 0j, complex(0, -DRIVE * SCALE), 57.0)
-        assert len(found.doubtful) or abs(found.angle[-1] - state[-1, 3]) < 0.01
-        doubtful += len(found.doubtful) > 0
+        result = count_turns(t, place, turned, 0j, complex(0, -DRIVE * SCALE), 57.0)
+        assert len(result.doubtful) or abs(result.angle[-1] - state[-1, 3]) < 0.01
+        doubtful += len(result.doubtful) > 0
     assert doubtful < 3
 
 
@@ -83,8 +83,8 @@ def test_steady_rotation_does_not_determine_the_contact(swing: float, determined
     angle = 1.6 * t + swing * np.sin(2.2 * t)
     centre = (SCALE * 0.0244 - 1j * DRIVE * SCALE * np.interp(t, fine, swept)) * np.exp(1j * angle)
     off, wrong = noise(len(t), 0)
-    found = pivot(t, centre + off, angle + wrong, np.ones(len(t), dtype=bool), 57.0)
-    assert (found is not None) == determined
+    result = pivot(t, centre + off, angle + wrong, np.ones(len(t), dtype=bool), 57.0)
+    assert (result is not None) == determined
 
 
 CLOCKS = [

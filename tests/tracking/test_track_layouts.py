@@ -107,10 +107,10 @@ def test_what_is_said_is_not_looked_for(tmp_path: Path) -> None:
         np.abs(np.hypot(*(z - np.roll(z, 1, axis=0)).T)) for z in (at, np.array([m["at"] for m in THREE]))
     ]
     assert np.ptp(sides[0] / sides[1]) < 1e-9
-    found = udd.track(film.path, layout=THREE).meta["calibration"]
+    result = udd.track(film.path, layout=THREE).meta["calibration"]
     for item in ("mark 1", "scale", "exposure", "pivot", "W"):
-        assert found[item][1] is not None and found[item][1] > 0, item
-    assert abs(found["exposure"][0] - 0.01) < 4 * found["exposure"][1] + 1e-3
+        assert result[item][1] is not None and result[item][1] > 0, item
+    assert abs(result["exposure"][0] - 0.01) < 4 * result["exposure"][1] + 1e-3
 
 
 def test_nothing_outside_the_region_is_looked_at(tmp_path: Path) -> None:

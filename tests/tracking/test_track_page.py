@@ -36,17 +36,17 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(film: Path) -> Tracking:
+def tracking(film: Path) -> Tracking:
     return tracked.track_disk(film)
 
 
-def test_the_page_holds_all_and_stands_alone(film: Path, found: Tracking, tmp_path: Path) -> None:
-    page(film, found, tmp_path / "page.html", command="udd track run.mp4 --page page.html")
+def test_the_page_holds_all_and_stands_alone(film: Path, tracking: Tracking, tmp_path: Path) -> None:
+    page(film, tracking, tmp_path / "page.html", command="udd track run.mp4 --page page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>") and "97 of 99 frames" in text
     for said in ("Positions", "The camera and the device", "How each frame did", "Does it roll?", "±"):
         assert said in text
-    for item in found.measurement.meta["calibration"]:
+    for item in tracking.measurement.meta["calibration"]:
         assert f'<th scope="row">{item}</th>' in text
     for flag in (
         "dup: the frame repeats",
@@ -56,21 +56,21 @@ def test_the_page_holds_all_and_stands_alone(film: Path, found: Tracking, tmp_pa
         assert flag in text
     images = re.findall(r'<img src="data:image/(?:png|jpeg);base64,[^"]{1000,}" alt="([^"]+)"', text)
     # frames with why, then motion, quality, map, rolling
-    assert len(images) == len(chosen(found.measurement)) + 4 and any("black" in alt for alt in images)
+    assert len(images) == len(chosen(tracking.measurement)) + 4 and any("black" in alt for alt in images)
     assert "http" not in text and "<script" not in text and str(film.parent) not in text
-    page(film, found, tmp_path / "again.html", command="udd track run.mp4 --page page.html")
+    page(film, tracking, tmp_path / "again.html", command="udd track run.mp4 --page page.html")
     assert (tmp_path / "again.html").read_bytes() == (tmp_path / "page.html").read_bytes()
 
 
-def test_values_are_told_to_their_errors(found: Tracking) -> None:
-    rows = {row["name"]: row for row in calibration(found.measurement)}
-    scale = found.measurement.meta["calibration"]["scale"]
+def test_values_are_told_to_their_errors(tracking: Tracking) -> None:
+    rows = {row["name"]: row for row in calibration(tracking.measurement)}
+    scale = tracking.measurement.meta["calibration"]["scale"]
     assert float(rows["scale"]["value"]) == pytest.approx(scale[0], abs=0.1 * scale[1])
     assert len(rows["scale"]["value"]) <= 8 and rows["exposure"]["unit"] == "ms"
 
 
-def test_a_table_read_back_makes_a_page_too(film: Path, found: Tracking, tmp_path: Path) -> None:
-    found.measurement.to_csv(tmp_path / "m.csv")
+def test_a_table_read_back_makes_a_page_too(film: Path, tracking: Tracking, tmp_path: Path) -> None:
+    tracking.measurement.to_csv(tmp_path / "m.csv")
     page(film, udd.read_measurement(tmp_path / "m.csv"), tmp_path / "page.html")
     assert "by the place of the middle" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
@@ -86,8 +86,8 @@ def test_the_command_writes_it(film: Path, tmp_path: Path, capsys: pytest.Captur
     assert "--page is for one film" in capsys.readouterr().err
 
 
-def test_what_is_left_of_rolling_is_noise_here_and_shows_a_wrong_clock(found: Tracking) -> None:
-    m = found.measurement
+def test_what_is_left_of_rolling_is_noise_here_and_shows_a_wrong_clock(tracking: Tracking) -> None:
+    m = tracking.measurement
     fine = health(m)
     assert fine is not None and 0.2 < fine.rms / fine.noise < 3  # the model is the maker's own
     # a disk that slips sideways by 5 mm/s in one direction of turning

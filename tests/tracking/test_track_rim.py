@@ -27,26 +27,26 @@ def rim(
 
 @pytest.mark.parametrize("turns", [1.0, 0.3])
 def test_a_shift_in_the_picture_is_not_taken_for_the_centre(turns: float) -> None:
-    found = turning_circle(*rim(np.random.default_rng(1), turns, 0.15 - 0.1j))
-    assert abs(found.centre - CENTRE) < 4 * found.centre_sigma < 0.2
-    assert abs(found.radius - RADIUS) < 4 * found.sigma < 0.2
+    circle = turning_circle(*rim(np.random.default_rng(1), turns, 0.15 - 0.1j))
+    assert abs(circle.centre - CENTRE) < 4 * circle.centre_sigma < 0.2
+    assert abs(circle.radius - RADIUS) < 4 * circle.sigma < 0.2
 
 
 def test_the_centre_is_as_good_as_said() -> None:
     z = []
     for seed in range(200):
         rng = np.random.default_rng(seed)
-        found = turning_circle(*rim(rng, 0.5, complex(*rng.normal(0, 0.2, 2))))
-        off = (found.centre - CENTRE) / found.centre_sigma
+        circle = turning_circle(*rim(rng, 0.5, complex(*rng.normal(0, 0.2, 2))))
+        off = (circle.centre - CENTRE) / circle.centre_sigma
         z += [off.real, off.imag]
     # the rms of 400 numbers scatters by 4 % by chance; what 40 frames say of the errors is a little low
     assert 0.9 < np.sqrt(np.mean(np.square(z))) < 1.15
 
 
 def test_a_disk_that_does_not_turn_has_its_centre_where_its_rim_seems_to_be() -> None:
-    found = turning_circle(*rim(np.random.default_rng(2), 0.0, 0.2 + 0.1j))
-    assert abs(found.centre - CENTRE) < 3 * found.centre_sigma
-    assert found.centre_sigma > 0.15  # as well as is known how far rims seem to be shifted
+    circle = turning_circle(*rim(np.random.default_rng(2), 0.0, 0.2 + 0.1j))
+    assert abs(circle.centre - CENTRE) < 3 * circle.centre_sigma
+    assert circle.centre_sigma > 0.15  # as well as is known how far rims seem to be shifted
 
 
 def test_edges_on_few_rays_are_no_rim() -> None:

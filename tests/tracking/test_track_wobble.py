@@ -45,16 +45,16 @@ def tracks(amplitude: float, noise: float, axis: float = 0.0, n: int = 400) -> t
 
 @pytest.mark.parametrize(("degrees", "axis"), [(10.0, 0.0), (5.0, 0.6), (3.0, -0.4)])
 def test_amplitude_and_axis(degrees: float, axis: float) -> None:
-    found = wobble(*tracks(math.radians(degrees), 0.03, axis))
-    assert abs(found.amplitude - math.radians(degrees)) < 3 * found.sigma < math.radians(1.5)
-    assert abs(np.angle(np.exp(2j * (found.axis - axis)))) / 2 < math.radians(6)  # tried 5 degrees apart
-    assert found.least < found.amplitude
+    correction = wobble(*tracks(math.radians(degrees), 0.03, axis))
+    assert abs(correction.amplitude - math.radians(degrees)) < 3 * correction.sigma < math.radians(1.5)
+    assert abs(np.angle(np.exp(2j * (correction.axis - axis)))) / 2 < math.radians(6)  # tried 5 degrees apart
+    assert correction.least < correction.amplitude
 
 
 def test_noise_is_no_wobble() -> None:
     for noise in (0.01, 0.1, 1.0):
-        found = wobble(*tracks(0.0, noise))
-        assert found.amplitude == 0 and found.least > 0
+        correction = wobble(*tracks(0.0, noise))
+        assert correction.amplitude == 0 and correction.least > 0
 
 
 def test_too_few_marks_or_frames_say_nothing() -> None:

@@ -203,9 +203,9 @@ def _strength(world: World, law: Law, motion: Run, t: np.ndarray) -> float:
 
 def _multiple(world: World, law: Law, motion: Run, camera: Camera, known: udd.Disk, t: np.ndarray) -> float:
     """The law's size in units of its detection limit, on this motion."""
-    found = information(world, law, motion, camera, assumed(known), t)
+    result = information(world, law, motion, camera, assumed(known), t)
     a = np.array(law.amplitudes)
-    return float(np.sqrt(a @ found @ a / threshold(known, t, len(a))))
+    return float(np.sqrt(a @ result @ a / threshold(known, t, len(a))))
 
 
 def _unit(kind: Kind, motion: Run, t: np.ndarray, rng: np.random.Generator) -> Law:

@@ -72,8 +72,8 @@ def main() -> int:
                 print(f"{done} records", file=sys.stderr, flush=True)
     print("| parameter | records | rms of z | 95 % by chance | median size, of a Gaussian's |")
     print("|---|---|---|---|---|")
-    for name, found in scores.items():
-        n, z = len(found), np.array(found)
+    for name, result in scores.items():
+        n, z = len(result), np.array(result)
         low, high = np.sqrt(stats.chi2.ppf([0.025, 0.975], n) / n)
         rms, middle = np.sqrt(np.mean(z**2)), np.median(np.abs(z)) / stats.norm.ppf(0.75)
         print(f"| {name} | {n} | {rms:.2f} | {low:.2f} to {high:.2f} | {middle:.2f} |")

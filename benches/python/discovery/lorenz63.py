@@ -93,10 +93,10 @@ class Score:
 def score(recover: Recover, t: np.ndarray, noisy: np.ndarray) -> Score:
     """Run a method on a record."""
     begin = time.perf_counter()
-    found = recover(t, noisy)
+    result = recover(t, noisy)
     seconds = time.perf_counter() - begin
-    wrong = int(np.sum((found != 0) != (TRUTH != 0)))
-    return Score(wrong, float(np.linalg.norm(found - TRUTH) / np.linalg.norm(TRUTH)), seconds)
+    wrong = int(np.sum((result != 0) != (TRUTH != 0)))
+    return Score(wrong, float(np.linalg.norm(result - TRUTH) / np.linalg.norm(TRUTH)), seconds)
 
 
 def scores(recover: Recover, length: float, noise: float, seeds: Iterable[int], unit: str) -> list[Score]:
@@ -109,21 +109,21 @@ def best(methods: dict[str, Recover], length: float, noise: float, seeds: Iterab
     seeds = list(seeds)
 
     def merit(name: str) -> tuple[int, int]:
-        found = scores(methods[name], length, noise, seeds, unit)
-        return sum(s.recovered for s in found), -sum(s.wrong for s in found)
+        result = scores(methods[name], length, noise, seeds, unit)
+        return sum(s.recovered for s in result), -sum(s.wrong for s in result)
 
     return max(methods, key=merit)
 
 
-def line(name: str, length: float, noise: float, found: list[Score]) -> str:
+def line(name: str, length: float, noise: float, result: list[Score]) -> str:
     """One row of the table."""
-    n, hits = len(found), sum(s.recovered for s in found)
+    n, hits = len(result), sum(s.recovered for s in result)
     low, high = binomtest(hits, n).proportion_ci(method="wilson")
     published = PUBLISHED.get(round(length), {}).get(round(noise, 3))
     return (
         f"| {length:g} | {noise:.1%} | {name} | {hits}/{n} | {low:.0%}-{high:.0%} "
-        f"| {'-' if published is None else f'{published:.0%}'} | {np.mean([s.wrong for s in found]):.2f} "
-        f"| {np.median([s.error for s in found]):.2g} | {np.median([s.seconds for s in found]):.2f} |"
+        f"| {'-' if published is None else f'{published:.0%}'} | {np.mean([s.wrong for s in result]):.2f} "
+        f"| {np.median([s.error for s in result]):.2g} | {np.median([s.seconds for s in result]):.2f} |"
     )
 
 
@@ -157,8 +157,8 @@ def main() -> None:
             for family, settings in pysindy_peer.GRIDS.items():
                 methods = {str(s): functools.partial(pysindy_peer.lorenz, settings=s) for s in settings}
                 chosen = best(methods, *cell, tuning, given.unit)
-                found = scores(methods[chosen], *cell, records, given.unit)
-                print(line(f"PySINDy, {family}: {chosen}", *cell, found), flush=True)
+                result = scores(methods[chosen], *cell, records, given.unit)
+                print(line(f"PySINDy, {family}: {chosen}", *cell, result), flush=True)
 
 
 if __name__ == "__main__":

@@ -68,9 +68,9 @@ def machine_score(case: MachineCase, seed: int) -> MachineScore:
         result.lacks = list(machine.lacks)
         measurement, options = machine.asked(case.options)
         begin = time.perf_counter()
-        found = udd.discover(measurement, machine.known, **options)
+        answer = udd.discover(measurement, machine.known, **options)
         result.seconds = time.perf_counter() - begin
-        _judge(result, found, machine.sigma)
+        _judge(result, answer, machine.sigma)
     except Exception:  # one record's failure is a result too, and must not end the others
         result.error = traceback.format_exc(limit=-3)
     return result

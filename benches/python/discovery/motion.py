@@ -150,7 +150,7 @@ def staying(world: World, duration: float, rng: np.random.Generator, tries: int 
     for _ in range(tries):
         radius, angle = rng.uniform(0.01, 0.05), rng.uniform(0, 2 * np.pi)
         start = [rng.normal(0, 2), radius * np.sin(angle), radius * np.cos(angle), rng.uniform(0, 6)]
-        found = run(world, start, duration)
-        if found is not None:
-            return found
+        result = run(world, start, duration)
+        if result is not None:
+            return result
     return None

@@ -48,15 +48,15 @@ class Record:
 
 def records(hidden: str, count: int, seed: int, defects: bool) -> list[Record]:
     """Drawn records."""
-    found: list[Record] = []
+    results: list[Record] = []
     rng = np.random.default_rng(seed)
-    while len(found) < count:
+    while len(results) < count:
         device = Device(rng.uniform(0.012, 0.09))
         motion = staying(World(device, HIDDEN[hidden]), DURATION, rng)
         if motion is not None:
             camera = drawn(rng, precise=False, hard=False) if defects else Camera()
-            found.append(Record(device, hidden, *film(camera, motion, DURATION, rng)))
-    return found
+            results.append(Record(device, hidden, *film(camera, motion, DURATION, rng)))
+    return results
 
 
 def answer(record: Record, settings: Settings) -> list[Term]:

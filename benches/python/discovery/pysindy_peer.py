@@ -57,8 +57,8 @@ GRIDS = {
 
 def _kept(coefficients: list[np.ndarray]) -> np.ndarray:
     """The median of an ensemble's coefficients where enough of them are not zero."""
-    found = np.array(coefficients)
-    return np.where((found != 0).mean(axis=0) >= INCLUSION, np.median(found, axis=0), 0.0)
+    result = np.array(coefficients)
+    return np.where((result != 0).mean(axis=0) >= INCLUSION, np.median(result, axis=0), 0.0)
 
 
 def _ensemble(optimizer: Any, models: int) -> Any:
@@ -95,9 +95,9 @@ def lorenz(t: np.ndarray, noisy: np.ndarray, settings: Settings) -> np.ndarray:
     with warnings.catch_warnings():  # that a threshold removes every term is an answer like any other
         warnings.simplefilter("ignore")
         model.fit(noisy, t=t)
-    found = np.zeros((10, 3))
-    found[0 if settings.constant else 1 :] = model.coefficients().T
-    return found
+    result = np.zeros((10, 3))
+    result[0 if settings.constant else 1 :] = model.coefficients().T
+    return result
 
 
 @dataclass(frozen=True)
@@ -188,10 +188,10 @@ def disk(t: np.ndarray, seen: np.ndarray, device: Any, settings: Settings) -> li
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model.fit(states, t=grid)
-    found = np.asarray(model.coefficients())[:, 3:]
+    result = np.asarray(model.coefficients())[:, 3:]
     terms = []
-    for e, i in zip(*np.nonzero(found), strict=True):
+    for e, i in zip(*np.nonzero(result), strict=True):
         powers = MONOMIALS[i % len(MONOMIALS)]
         size = SCALES[e] / np.prod(SCALES ** np.array(powers)) * (_TYPICAL if e == 0 else 1.0)
-        terms.append(Term(EQUATIONS[e], _name(powers), float(found[e, i] * size)))
+        terms.append(Term(EQUATIONS[e], _name(powers), float(result[e, i] * size)))
     return terms

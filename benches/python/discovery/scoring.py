@@ -67,9 +67,9 @@ def score(case: Case, seed: int, duration: float, precise: bool) -> Score:
             values = dict(zip(law.kind.amplitudes, law.amplitudes, strict=True))
             result.truth.append({"name": law.kind.name, "momentum": law.momentum, **values, **law.shape})
         begin = time.process_time()
-        found = udd.discover(drawn.measurement, drawn.known)
+        answer = udd.discover(drawn.measurement, drawn.known)
         result.seconds = time.process_time() - begin
-        _judge(result, drawn, found)
+        _judge(result, drawn, answer)
     except Exception:  # one record's failure is a result too, and must not end the others
         result.error = traceback.format_exc(limit=3)
     return result
@@ -86,14 +86,14 @@ def _sense(result: Score, case: Case, seed: int, duration: float) -> None:
     result.false = len(discovery.effects)
 
 
-def _say(result: Score, found: udd.Discovery) -> None:
-    result.verdict = found.verdict
-    result.found = [f.effect.name for f in found.effects]
-    result.alternatives = [a.effect.name for a in found.alternatives]
-    result.scatter, result.level = float(found.fit.scatter), int(found.fit.level)
-    first = found.scans[0][:1] if found.scans else []
+def _say(result: Score, answer: udd.Discovery) -> None:
+    result.verdict = answer.verdict
+    result.found = [f.effect.name for f in answer.effects]
+    result.alternatives = [a.effect.name for a in answer.alternatives]
+    result.scatter, result.level = float(answer.fit.scatter), int(answer.fit.level)
+    first = answer.scans[0][:1] if answer.scans else []
     result.best = ", ".join(f"{s.candidate.title} chi2 {s.chi2:.0f}" for s in first)
-    after, before = found.error_after, found.error_before
+    after, before = answer.error_after, answer.error_before
     result.horizons = list(after.horizons)
     result.before, result.after = before.median.tolist(), after.median.tolist()
     result.floor = after.floor.tolist()
@@ -114,21 +114,21 @@ def _judge(result: Score, drawn: Record, discovery: udd.Discovery) -> None:
     result.oracle_error = [best[h] for h in result.horizons]
 
 
-def _otherwise(found: udd.Discovery, law: Law) -> set[str]:
+def _otherwise(answer: udd.Discovery, law: Law) -> set[str]:
     """Return other names of the law: the wheel's ripple is one of the drive at that frequency."""
     if law.kind.name != "wheel_ripple":
         return set()
-    turns = found.fit.parameters["W"] / (2 * np.pi * law.shape["r"])
-    line = 0.5 / float(np.ptp(found.measurement.t))
-    ripples = [f.effect for f in found.effects if f.effect.name == "drive_ripple"]
+    turns = answer.fit.parameters["W"] / (2 * np.pi * law.shape["r"])
+    line = 0.5 / float(np.ptp(answer.measurement.t))
+    ripples = [f.effect for f in answer.effects if f.effect.name == "drive_ripple"]
     return {"drive_ripple"} if any(abs(r.parameters["f"] - turns) < line for r in ripples) else set()
 
 
-def _unexplained(found: udd.Discovery, true: set[str]) -> list[str]:
+def _unexplained(answer: udd.Discovery, true: set[str]) -> list[str]:
     """Effects that are not the truth's and for which none of the truth's is named as an alternative."""
     left = []
-    for one in found.effects:
-        others = {a.effect.name for a in found.alternatives if a.instead_of == one.effect.name}
+    for one in answer.effects:
+        others = {a.effect.name for a in answer.alternatives if a.instead_of == one.effect.name}
         if not true & {one.effect.name, *others}:
             left.append(one.effect.name)
     return left

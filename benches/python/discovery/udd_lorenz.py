@@ -23,7 +23,7 @@ def prune(t: np.ndarray, noisy: np.ndarray) -> np.ndarray:
     """Coefficients (10, 3); unlike ODR-BINDy it does not get the noise."""
     measured = udd.Measurement(t, dict(zip(STATES, noisy.T, strict=True)))
     try:
-        found = udd.prune(measured, library(), spread=SPREAD)
+        pruned = udd.prune(measured, library(), spread=SPREAD)
     except udd.UddError:
         return np.zeros((len(TERMS), len(STATES)))
-    return np.array(list(found.model.parameters.values())).reshape(len(STATES), -1).T
+    return np.array(list(pruned.model.parameters.values())).reshape(len(STATES), -1).T

@@ -125,9 +125,9 @@ def prune(record: Record, spread: float | None = None) -> tuple[Array, int]:
         {n: 0.0 for own in names for n in own},
         angles=list(system.angles),
     )
-    found = udd.prune(udd.Measurement(record.t, record.columns, sigma=record.sigma), model, spread=spread)
-    factors = np.array([[found.model.parameters[n] for n in own] for own in names]).T
-    return factors, len(found.undetermined)
+    pruned = udd.prune(udd.Measurement(record.t, record.columns, sigma=record.sigma), model, spread=spread)
+    factors = np.array([[pruned.model.parameters[n] for n in own] for own in names]).T
+    return factors, len(pruned.undetermined)
 
 
 def pysindy(record: Record) -> Array:

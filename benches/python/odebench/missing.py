@@ -187,9 +187,9 @@ def _rates(model: udd.Model) -> Rates:
     return lambda states: model.rates(0.0, states) if np.isfinite(states).all() else states * np.nan
 
 
-def _held_out(found: udd.Discovery) -> tuple[float, float]:
-    horizon = found.horizon
+def _held_out(answer: udd.Discovery) -> tuple[float, float]:
+    horizon = answer.horizon
     if horizon is None:
-        return found.error_before.whole, found.error_after.whole
-    k = found.error_before.horizons.index(horizon)
-    return float(found.error_before.median[k]), float(found.error_after.median[k])
+        return answer.error_before.whole, answer.error_after.whole
+    k = answer.error_before.horizons.index(horizon)
+    return float(answer.error_before.median[k]), float(answer.error_after.median[k])

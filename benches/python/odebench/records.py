@@ -138,10 +138,10 @@ class Record:
         truth = motion(self.system, start, self.t)
         if truth is None:
             return float("nan")
-        found = run(right, start, self.t, _FAR * max(1.0, float(np.abs(truth).max())), 1e-7)
-        if found is None:
+        result = run(right, start, self.t, _FAR * max(1.0, float(np.abs(truth).max())), 1e-7)
+        if result is None:
             return float("-inf")
-        return float(1 - ((found - truth) ** 2).sum() / ((truth - truth.mean(axis=0)) ** 2).sum())
+        return float(1 - ((result - truth) ** 2).sum() / ((truth - truth.mean(axis=0)) ** 2).sum())
 
 
 def record(

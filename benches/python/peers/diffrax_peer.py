@@ -114,8 +114,8 @@ def largest(rtol: float, atol: float) -> Any:
     several = jax.jit(jax.vmap(one, in_axes=(0, 0, None, None)))
 
     def run(w: Any, starts: Any, transient: float, end: float) -> Any:
-        found = several(jnp.asarray(w), jnp.asarray(starts), float(transient), float(end))
-        return np.asarray(found[0]), np.asarray(found[1])
+        result = several(jnp.asarray(w), jnp.asarray(starts), float(transient), float(end))
+        return np.asarray(result[0]), np.asarray(result[1])
 
     return run
 
@@ -126,9 +126,9 @@ def points(rtol: float, atol: float) -> Any:
 
     def point(carried: Any, _: Any) -> Any:
         state, w = carried
-        found = solved(dle, state, 1e4, w, rtol, atol, event=section)
+        result = solved(dle, state, 1e4, w, rtol, atol, event=section)
         # Past the section, not to be found again.
-        return (found.at[2].set(1e-13), w), found
+        return (result.at[2].set(1e-13), w), result
 
     most = 20
     several = jax.jit(lambda state, w: jax.lax.scan(point, (state, w), length=most))
@@ -136,8 +136,8 @@ def points(rtol: float, atol: float) -> Any:
     def run(start: Any, n: int, w: float = 1.0) -> Any:
         parts, state = [], jnp.asarray(start)
         while len(parts) * most < n:
-            (state, _), found = several(state, w)
-            parts.append(np.asarray(found))
+            (state, _), result = several(state, w)
+            parts.append(np.asarray(result))
         return np.concatenate(parts)[:n]
 
     return run

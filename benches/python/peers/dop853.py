@@ -34,15 +34,15 @@ def dle_tangent(count: int) -> Rates:
     """The same with this many tangent vectors after the state."""
 
     def rates(y: Sequence[str], p: Sequence[str]) -> list[str]:
-        found = dle(y, p)
+        result = dle(y, p)
         for k in range(1, count + 1):
             u = y[3 * k : 3 * k + 3]
-            found += [
+            result += [
                 f"{u[1]} - {u[0]}",
                 f"{u[0]} * {y[2]} + {y[0]} * {u[2]}",
                 f"-({u[0]} * {y[1]} + {y[0]} * {u[1]})",
             ]
-        return found
+        return result
 
     return rates
 

@@ -117,7 +117,7 @@ def largest(rtol: float, atol: float) -> Any:
         return total / pieces, np.array(state)
 
     def run(drives: Any, starts: Any, transient: float, end: float) -> Any:
-        found = [one(float(a), s, transient, end) for a, s in zip(drives, starts, strict=True)]
-        return np.array([x for x, _ in found]), np.array([s for _, s in found])
+        results = [one(float(a), s, transient, end) for a, s in zip(drives, starts, strict=True)]
+        return np.array([x for x, _ in results]), np.array([s for _, s in results])
 
     return run

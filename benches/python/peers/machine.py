@@ -47,10 +47,10 @@ def processor() -> str:
 
 def versions() -> dict[str, str]:
     """The versions of what takes part."""
-    found = {}
+    results = {}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            results[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+            results[package] = "not installed"
+    return results

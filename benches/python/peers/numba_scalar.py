@@ -173,11 +173,11 @@ def final(
     """The setting, and ``final(start, t)``: the state at t of one trajectory of three equations."""
     run = run_of(rates, 3, len(parameters), 3)
 
-    def found(start: Any, t: float) -> Any:
+    def end_state(start: Any, t: float) -> Any:
         return np.array(run(tuple(np.asarray(start).tolist()), parameters, t, 0.01, rtol, atol))
 
-    found((1.0, 1.0, 1.0), 1.0)
-    return f"DOP853, rtol {rtol:g}, atol {atol:g}", found
+    end_state((1.0, 1.0, 1.0), 1.0)
+    return f"DOP853, rtol {rtol:g}, atol {atol:g}", end_state
 
 
 @cache

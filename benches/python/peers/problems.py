@@ -120,9 +120,9 @@ def reference_states(flow: Flow = DLE) -> Array:
     return np.ascontiguousarray(final(probe_starts(flow).T.ravel(), flow.span).reshape(3, -1).T)
 
 
-def state_error(found: Any, flow: Flow = DLE) -> float:
+def state_error(result: Any, flow: Flow = DLE) -> float:
     """The median over `probe_starts` of the largest error of a component after the flow's span."""
-    return float(np.median(np.abs(np.asarray(found) - reference_states(flow)).max(axis=-1)))
+    return float(np.median(np.abs(np.asarray(result) - reference_states(flow)).max(axis=-1)))
 
 
 SECTION_POINTS = 5  # reached from `probe_starts` at about t = SPAN
@@ -137,15 +137,15 @@ def reference_points() -> Array:
 
     height.direction = 1.0  # type: ignore[attr-defined]
     height.terminal = SECTION_POINTS  # type: ignore[attr-defined]
-    found = []
+    results = []
     for start in probe_starts():
         run = solve_ivp(dle, (0.0, 500.0), start, method="DOP853", rtol=3e-14, atol=1e-15, events=height)
-        found.append(run.y_events[0][-1][:2])
-    return np.array(found)
+        results.append(run.y_events[0][-1][:2])
+    return np.array(results)
 
 
-def point_error(found: Array) -> float:
-    return float(np.median(np.abs(np.asarray(found)[:, :2] - reference_points()).max(axis=-1)))
+def point_error(result: Array) -> float:
+    return float(np.median(np.abs(np.asarray(result)[:, :2] - reference_points()).max(axis=-1)))
 
 
 def branch(Omega: float) -> tuple[float, float]:
@@ -209,6 +209,6 @@ def reference_disk() -> Array:
     return np.array([disk_pieces(start, DISK_SPAN, 3e-14, 1e-17) for start in disk_starts()])
 
 
-def disk_error(found: Array) -> float:
+def disk_error(result: Array) -> float:
     """The median over `disk_starts` of the largest error, relative to DISK_SCALE, after DISK_SPAN seconds."""
-    return float(np.median(np.abs((np.asarray(found) - reference_disk()) / DISK_SCALE).max(axis=-1)))
+    return float(np.median(np.abs((np.asarray(result) - reference_disk()) / DISK_SCALE).max(axis=-1)))

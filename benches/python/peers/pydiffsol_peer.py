@@ -93,8 +93,8 @@ def largest(rtol: float, atol: float) -> Any:
         return logs / (end - transient), state[:3]
 
     def run(w: Any, starts: Any, transient: float, end: float) -> Any:
-        found = [one(float(a), s, transient, end) for a, s in zip(w, starts, strict=True)]
-        return np.array([x for x, _ in found]), np.array([s for _, s in found])
+        results = [one(float(a), s, transient, end) for a, s in zip(w, starts, strict=True)]
+        return np.array([x for x, _ in results]), np.array([s for _, s in results])
 
     return run
 
@@ -105,14 +105,14 @@ def points(rtol: float, atol: float) -> Any:
     horizon = np.array([1e4])
 
     def run(start: Any, n: int, w: float = 1.0) -> Any:
-        found: list[Any] = []
+        results: list[Any] = []
         state = np.array(start, dtype=float)
-        while len(found) < n:
+        while len(results) < n:
             state = ode.solve_dense(np.array([w, *state]), horizon).ys[:, -1].copy()
             up = w - state[0] * state[1] > 0.0
             if up:
-                found.append(state.copy())
+                results.append(state.copy())
             state[2] = 1e-13 if up else -1e-13  # past the surface, not to be found again
-        return np.array(found)
+        return np.array(results)
 
     return run

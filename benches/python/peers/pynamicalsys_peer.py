@@ -29,11 +29,11 @@ def disk_equations(t: float, u: Any, p: Any) -> Any:
 
 
 def system(rtol: float, atol: float) -> Any:
-    found = ContinuousDynamicalSystem(
+    result = ContinuousDynamicalSystem(
         equations_of_motion=equations, jacobian=jacobian, system_dimension=3, number_of_parameters=1
     )
-    found.integrator("rk45", atol=atol, rtol=rtol)
-    return found
+    result.integrator("rk45", atol=atol, rtol=rtol)
+    return result
 
 
 def ending_at(ds: Any, start: Any, t: float, parameters: list[float]) -> Any:
@@ -77,11 +77,11 @@ def largest(rtol: float, atol: float) -> Any:
     def run(w: Any, starts: Any, transient: float, end: float) -> Any:
         if end < 100.0:
             return None, np.array([ending_at(ds, s, end, [float(a)]) for a, s in zip(w, starts, strict=True)])
-        found = [
+        results = [
             ds.lyapunov(np.array(s), end, parameters=[float(a)], transient_time=transient, num_exponents=1)
             for a, s in zip(w, starts, strict=True)
         ]
-        return np.array(found, dtype=float), None
+        return np.array(results, dtype=float), None
 
     return run
 

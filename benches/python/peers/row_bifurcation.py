@@ -182,10 +182,10 @@ def per_drive(setting: str, points: Any, note: str) -> Entry:
     """From ``points(start, n, w)``, one drive after the other."""
 
     def run(w: Any, starts: Any, transient: int, kept: int) -> Any:
-        found = [
+        results = [
             points(start, transient + kept, float(a))[transient:] for a, start in zip(w, starts, strict=True)
         ]
-        return np.array(found)
+        return np.array(results)
 
     return entry(setting, run, note)
 

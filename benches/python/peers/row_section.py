@@ -41,9 +41,9 @@ def numba(rtol: float = 1e-9, atol: float = 1e-12) -> Entry:
     cross = numba_scalar.crossings_of(dop853.dle, 3, 1, 3, level=2)
 
     def points(start: Any, n: int) -> Any:
-        found = np.empty((n, 3))
-        cross((start[0], start[1], start[2]), (1.0,), 0, found, rtol, atol)
-        return found
+        result = np.empty((n, 3))
+        cross((start[0], start[1], start[2]), (1.0,), 0, result, rtol, atol)
+        return result
 
     points((1.0, 1.0, 0.01), 2)
     return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", points)
@@ -55,23 +55,23 @@ def heyoka(tol: float = 1e-7) -> Entry:
     from peers import heyoka_peer
 
     equations = heyoka_peer.dle()
-    found: list[Any] = []
+    results: list[Any] = []
 
     def record(ta: Any, t: float, sign: int) -> None:
         ta.update_d_output(t)
-        found.append(ta.d_output.copy())
+        results.append(ta.d_output.copy())
 
     section = hy.nt_event(equations[2][0], record, direction=hy.event_direction.positive)
     ta = heyoka_peer.single(equations, 3, [1.0], tol, nt_events=[section])
 
     def points(start: Any, n: int) -> Any:
-        found.clear()
+        results.clear()
         ta.state[:] = start
         # The clock is set back often: at t = 10^5 its rounding alone would put a point 1e-11 off.
-        while len(found) < n:
+        while len(results) < n:
             ta.time = 0.0
-            ta.propagate_until(min(1000.0, 4.5 * (n - len(found)) + 5.0))
-        return np.array(found[:n])
+            ta.propagate_until(min(1000.0, 4.5 * (n - len(results)) + 5.0))
+        return np.array(results[:n])
 
     return entry(f"Taylor, nt_event, tol {tol:g}", points)
 
@@ -86,15 +86,15 @@ def scipy_points(rtol: float, atol: float) -> Any:
     height.direction = 1.0  # type: ignore[attr-defined]
 
     def points(start: Any, n: int, w: float = 1.0) -> Any:
-        found: list[Any] = []
+        results: list[Any] = []
         options = {"method": "DOP853", "rtol": rtol, "atol": atol, "events": height, "args": (w,)}
-        while len(found) < n:
-            height.terminal = min(100, n - len(found))  # type: ignore[attr-defined]
+        while len(results) < n:
+            height.terminal = min(100, n - len(results))  # type: ignore[attr-defined]
             run = solve_ivp(problems.dle, (0.0, 1e9), start, **options)
-            found += list(run.y_events[0])
+            results += list(run.y_events[0])
             start = run.y[:, -1]
             start[2] = 1e-300  # past the section, not to be found again
-        return np.array(found)
+        return np.array(results)
 
     return points
 

@@ -94,11 +94,11 @@ def lanes(rtol: float = 1e-6, atol: float = 1e-9) -> Entry:
             step(s, rtol, atol)
 
     def finals(starts: Any, t: float) -> Any:
-        found = np.empty_like(starts)
+        result = np.empty_like(starts)
         with ThreadPoolExecutor(2) as pool:
-            for done in [pool.submit(share, starts, found, i, t, rtol, atol) for i in range(2)]:
+            for done in [pool.submit(share, starts, result, i, t, rtol, atol) for i in range(2)]:
                 done.result()
-        return found
+        return result
 
     finals(problems.random_starts(4), 1.0)
     return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", finals, least=2000)
@@ -115,7 +115,7 @@ def heyoka(tol: float = 3e-5, width: int = 16) -> Entry:
     pair = [integrator(), integrator()]
 
     def finals(starts: Any, t: float) -> Any:
-        found = np.empty_like(starts)
+        result = np.empty_like(starts)
 
         def share(first: int) -> None:
             ta = pair[first]
@@ -124,11 +124,11 @@ def heyoka(tol: float = 3e-5, width: int = 16) -> Entry:
                 ta.set_time(0.0)
                 ta.state[:, : len(part)] = part.T
                 ta.propagate_until(t)
-                found[at : at + width] = ta.state[:, : len(part)].T
+                result[at : at + width] = ta.state[:, : len(part)].T
 
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(share, range(2)))
-        return found
+        return result
 
     return entry(f"Taylor, tol {tol:g}, batches of {width}", finals, least=64)
 

@@ -251,8 +251,8 @@ def scipy(rtol: float = 4e-6, atol: float = 4e-9) -> Entry:
         return logs / (end - transient), state[:3]
 
     def run(w: Any, starts: Any, transient: float, end: float) -> Any:
-        found = [one(float(a), start, transient, end) for a, start in zip(w, starts, strict=True)]
-        return np.array([x for x, _ in found]), np.array([y for _, y in found])
+        results = [one(float(a), start, transient, end) for a, start in zip(w, starts, strict=True)]
+        return np.array([x for x, _ in results]), np.array([y for _, y in results])
 
     return entry(f"DOP853, rtol {rtol:g}, atol {atol:g}", run, "one thread: Python does not run in two")
 

@@ -47,8 +47,8 @@ def spectrum(rtol: float = 2.8e-8) -> tuple[str, Any]:
 
     def run(start: Any, t: float) -> Any:
         # The call of udd.lyapunov_spectrum, for a given time without a transient.
-        found = _core.lyapunov(Batch(model, row, start[None], rtol, 1e-3 * rtol), True, t, 0.0, 0.0)
-        return found["value"][0], found["end"][0]
+        exponents = _core.lyapunov(Batch(model, row, start[None], rtol, 1e-3 * rtol), True, t, 0.0, 0.0)
+        return exponents["value"][0], exponents["end"][0]
 
     return f"Taylor, rtol {rtol:g}", run
 
@@ -65,8 +65,8 @@ def sweep(rtol: float = 3.9e-5) -> tuple[str, Any]:
         # The call of udd.lyapunov, from given starts.
         rows = np.column_stack([w, np.zeros(len(w))])
         batch = Batch(model, rows, starts, rtol, 1e-3 * rtol, threads=2)
-        found = _core.lyapunov(batch, False, t, transient, 0.0)
-        return found["value"][:, 0], found["end"]
+        exponents = _core.lyapunov(batch, False, t, transient, 0.0)
+        return exponents["value"][:, 0], exponents["end"]
 
     return f"Taylor, rtol {rtol:g}", run
 

@@ -64,11 +64,13 @@ def main() -> int:
         print(f"{name} is not installed here; the table goes without it")
     trackers = {name: tracker for name, tracker in trackers.items() if name in wanted}
     for case in named([w for w in args.only.split(",") if w]):
-        found = shared(case) if case.name.startswith("shared") else (case, film(case, args.folder, args.seed))
-        if found is None:
+        result = (
+            shared(case) if case.name.startswith("shared") else (case, film(case, args.folder, args.seed))
+        )
+        if result is None:
             print(f"{case.name:34} is not here", flush=True)
             continue
-        case, made = found
+        case, made = result
         for name, tracker in trackers.items():
             try:
                 s = tracker(case, made)

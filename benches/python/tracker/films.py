@@ -142,16 +142,16 @@ def run(case: Case, seed: int) -> udd.Trajectory:
     A `fast` case takes the fastest of twelve.
     """
     random = np.random.default_rng([seed, sum(case.name.encode())])
-    found: list[udd.Trajectory] = []
+    results: list[udd.Trajectory] = []
     for _ in range(400):
         start = [random.uniform(-3, 3), random.uniform(-0.03, 0.03), random.uniform(-0.05, 0.05)]
         start.append(random.uniform(-math.pi, math.pi))
         r = udd.simulate(udd.Disk(case.W), np.arange(0, SECONDS, 0.005), start, dense=True)
         left = r.outcome == "ejected"
         if left == case.ejected and (not left or r.t[-1] > 4):
-            found.append(r)
-        if len(found) == (12 if case.fast else 1):
-            return max(found, key=lambda r: float(np.abs(r.state[:, 0]).max()))
+            results.append(r)
+        if len(results) == (12 if case.fast else 1):
+            return max(results, key=lambda r: float(np.abs(r.state[:, 0]).max()))
     raise RuntimeError(f"no start found for {case.name}")
 
 

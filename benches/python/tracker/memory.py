@@ -63,7 +63,7 @@ def main() -> None:
     args = parser.parse_args()
     if args.one:
         return one(args.one)
-    found = {}
+    results = {}
     with tempfile.TemporaryDirectory() as folder:
         for frames in map(int, args.frames.split(",")):
             path = Path(folder) / f"{frames}.mp4"
@@ -73,9 +73,11 @@ def main() -> None:
                 cwd=Path(__file__).parent,
             )
             command = [sys.executable, __file__, "--one", str(path)]
-            found[frames] = int(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
-            print(f"{frames} frames: peak {found[frames] / 1e6:.0f} MB", flush=True)
-    (short, least), (long, most) = min(found.items()), max(found.items())
+            results[frames] = int(
+                subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+            )
+            print(f"{frames} frames: peak {results[frames] / 1e6:.0f} MB", flush=True)
+    (short, least), (long, most) = min(results.items()), max(results.items())
     allowed = least + ROW * (long - short) + SLACK
     growth = (most - least) / max(long - short, 1)
     print(f"grows by {growth:.0f} bytes a frame (at most {ROW}, and {SLACK / 1e6:.0f} MB once)")

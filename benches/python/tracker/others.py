@@ -109,9 +109,9 @@ def particles(case: Case, film: Film) -> Score:
             left, top = max(0, x - diameter), max(0, y - diameter)
             part = mask[top : y + h + diameter, left : x + w + diameter]
             soft = cv2.GaussianBlur(255 * part, (0, 0), 0.3 * SIDE * film.scale)
-            found: Any = trackpy.locate(soft, diameter, topn=1, preprocess=False)
-            if len(found):
-                out[k] = complex(found["x"].iloc[0] + left, found["y"].iloc[0] + top)
+            spots: Any = trackpy.locate(soft, diameter, topn=1, preprocess=False)
+            if len(spots):
+                out[k] = complex(spots["x"].iloc[0] + left, spots["y"].iloc[0] + top)
         return out
 
     return measured(case, film, find)
