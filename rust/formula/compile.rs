@@ -1,8 +1,7 @@
 //! Machine code for the steps of a [`Program`].
 //!
-//! It does the same operations in the same order, so no bit changes. Each result is stored, and stays in a register, too,
-//! until another result needs the register. Elementary functions and comparisons are left to the interpreter: the code
-//! between them is a function each.
+//! It does the same operations in the same order, so no bit changes. Elementary functions and comparisons are left to the
+//! interpreter: the code between them is a function each.
 
 use super::Unary;
 use super::program::{Action, Program, Step};
@@ -20,6 +19,8 @@ const MOST_STEPS: usize = 1 << 13;
 #[derive(Debug)]
 pub(super) struct Compiled {
     code: Code,
+    /// The place of the program's first register in the work.
+    registers: usize,
     interpreted: Vec<Step>,
 }
 
@@ -39,7 +40,7 @@ impl Compiled {
         for i in 0..=self.interpreted.len() {
             self.code.run(i, work, held, sides);
             if let Some(&step) = self.interpreted.get(i) {
-                program.perform(&[step], sides, work);
+                program.perform(&[step], sides, &mut work[self.registers..]);
             }
         }
     }
@@ -55,35 +56,29 @@ pub(super) fn compile(program: &Program, isa: Isa, lanes: usize) -> Option<Compi
     if program.steps.len() > MOST_STEPS {
         return None;
     }
-    let mut writer = Writer::new(Listing::new(isa, lanes), vec![true; program.states]);
+    let mut writer = Writer::new(Listing::new(isa, lanes), vec![true; program.states], 0);
     writer.steps(&program.steps);
-    writer.compiled()
+    writer.compiled(usize::MAX)
 }
 
-/// Registers for values; the others are for masks, for what is worked on, and for the sign bit.
-const REGISTERS: usize = 12;
-pub(super) const FIRST: Register = Register(12);
-pub(super) const SECOND: Register = Register(13);
-const MASK: Register = Register(14);
-const SIGN: Register = Register(15);
+/// Registers for what a step works on, for a mask, and for the sign bit; the listing allocates others.
+pub(super) const FIRST: Register = Register(0);
+pub(super) const SECOND: Register = Register(1);
+const MASK: Register = Register(2);
+const SIGN: Register = Register(3);
 
 pub(super) struct Writer {
     pub(super) list: Listing,
     /// The values, by their numbers, that are in the array `Held`; the others are in the array `Work`.
     held: Vec<bool>,
-    /// The values in registers, and when each was used last.
-    kept: [Option<(u16, usize)>; REGISTERS],
-    time: usize,
+    /// The place of the program's first register in the array `Work`.
+    registers: usize,
     interpreted: Vec<Step>,
 }
 
-fn register(i: usize) -> Register {
-    Register(u8::try_from(i).expect("sixteen registers"))
-}
-
 impl Writer {
-    pub(super) fn new(list: Listing, held: Vec<bool>) -> Self {
-        let mut writer = Self { list, held, kept: [None; REGISTERS], time: 0, interpreted: Vec::new() };
+    pub(super) fn new(list: Listing, held: Vec<bool>, registers: usize) -> Self {
+        let mut writer = Self { list, held, registers, interpreted: Vec::new() };
         writer.begin();
         writer
     }
@@ -99,84 +94,61 @@ impl Writer {
         }
     }
 
-    pub(super) fn compiled(mut self) -> Option<Compiled> {
+    /// The code. Elements of the work from `results` on are not needed afterwards, unless the interpreter reads them.
+    pub(super) fn compiled(mut self, results: usize) -> Option<Compiled> {
         self.list.end();
-        Some(Compiled { code: Code::new(self.list)?, interpreted: self.interpreted })
+        let results = if self.interpreted.is_empty() { results } else { usize::MAX };
+        let code = if self.list.allocate(results) { Code::new(self.list)? } else { return None };
+        Some(Compiled { code, registers: self.registers, interpreted: self.interpreted })
     }
 
     /// Begins a function.
     fn begin(&mut self) {
-        self.kept = [None; REGISTERS];
         let sign = self.list.constant(-0.0);
         self.list.load(SIGN, sign);
     }
 
-    /// A value in its register, or in its place in memory.
-    pub(super) fn operand(&mut self, value: u16) -> Operand {
-        self.time += 1;
-        for (i, kept) in self.kept.iter_mut().enumerate() {
-            if let Some((other, used)) = kept
-                && *other == value
-            {
-                *used = self.time;
-                return register(i).into();
-            }
-        }
-        let value = usize::from(value);
-        let held = self.held.get(value).is_some_and(|&held| held);
-        Place(if held { Array::Held } else { Array::Work }, value).into()
-    }
-
-    /// A value in its register, or loaded into this one.
-    fn loaded(&mut self, value: u16, to: Register) -> Register {
-        match self.operand(value) {
-            Operand::Register(register) => register,
-            place @ Operand::Place(_) => {
-                self.list.load(to, place);
-                to
-            }
+    /// The place of a register of the program.
+    pub(super) fn place(&self, register: u16) -> Place {
+        let register = usize::from(register);
+        match self.held.get(register) {
+            Some(true) => Place(Array::Held, register),
+            _ => Place(Array::Work, self.registers + register),
         }
     }
 
-    /// The register for a new value: its former one, or the one whose value was used longest ago.
-    fn room(&mut self, value: u16) -> Register {
-        self.time += 1;
-        let age = |kept: Option<(u16, usize)>| {
-            kept.map_or(1, |(other, used)| if other == value { 0 } else { used + 1 })
-        };
-        let i = (0..REGISTERS).min_by_key(|&i| age(self.kept[i])).expect("a register");
-        self.kept[i] = Some((value, self.time));
-        register(i)
+    /// Loads the value of a register of the program.
+    fn loaded(&mut self, register: u16, to: Register) -> Register {
+        let place = self.place(register);
+        self.list.load(to, place);
+        to
     }
 
-    /// `to = a . b` for values.
+    /// `to = a . b` for registers of the program.
     fn apply(&mut self, operation: Operation, to: Register, a: u16, b: u16) {
         let a = self.loaded(a, to);
-        let b = self.operand(b);
+        let b = self.place(b);
         self.list.apply(operation, to, a, b);
     }
 
     /// The code of a step; `None` if it has to be interpreted.
     fn step(&mut self, step: Step) -> Option<()> {
         let (operation, a, b) = self.until_last(step)?;
-        self.write(step.to, operation, a, b);
+        let to = self.place(step.to);
+        self.write(to, operation, a, b);
         Some(())
     }
 
-    /// Stores `a . b` as a value, which stays in a register, too.
-    pub(super) fn write(&mut self, value: u16, operation: Operation, a: Register, b: Operand) {
-        // The operands may be in this register: it is written last.
-        let to = self.room(value);
-        self.list.apply(operation, to, a, b);
-        self.list.store(Place(Array::Work, usize::from(value)), to);
+    /// Stores `a . b`.
+    pub(super) fn write(&mut self, to: Place, operation: Operation, a: Register, b: Operand) {
+        self.list.apply(operation, FIRST, a, b);
+        self.list.store(to, FIRST);
     }
 
-    /// Stores a copy of a value as another one.
-    pub(super) fn copy(&mut self, from: u16, value: u16) {
-        let from = self.operand(from);
-        let to = self.room(value);
-        self.list.load(to, from);
-        self.list.store(Place(Array::Work, usize::from(value)), to);
+    /// Stores a copy.
+    pub(super) fn copy(&mut self, from: Place, to: Place) {
+        self.list.load(FIRST, from);
+        self.list.store(to, FIRST);
     }
 
     /// Writes all operations of a step but the last, and returns that.
@@ -196,18 +168,18 @@ impl Writer {
             self.apply(Mul, FIRST, a, b);
         }
         Some(match step.action {
-            Action::Add => (Add, self.loaded(a, FIRST), self.operand(b)),
-            Action::Sub => (Sub, self.loaded(a, FIRST), self.operand(b)),
-            Action::Mul => (Mul, self.loaded(a, FIRST), self.operand(b)),
-            Action::Div => (Div, self.loaded(a, FIRST), self.operand(b)),
-            Action::Square => (Mul, self.loaded(a, FIRST), self.operand(a)),
+            Action::Add => (Add, self.loaded(a, FIRST), self.place(b).into()),
+            Action::Sub => (Sub, self.loaded(a, FIRST), self.place(b).into()),
+            Action::Mul => (Mul, self.loaded(a, FIRST), self.place(b).into()),
+            Action::Div => (Div, self.loaded(a, FIRST), self.place(b).into()),
+            Action::Square => (Mul, self.loaded(a, FIRST), self.place(a).into()),
             Action::Neg => (Xor, self.loaded(a, FIRST), SIGN.into()),
-            Action::MulMul => (Mul, FIRST, self.operand(c)),
-            Action::MulAdd => (Add, FIRST, self.operand(c)),
-            Action::MulSub => (Sub, FIRST, self.operand(c)),
+            Action::MulMul => (Mul, FIRST, self.place(c).into()),
+            Action::MulAdd => (Add, FIRST, self.place(c).into()),
+            Action::MulSub => (Sub, FIRST, self.place(c).into()),
             Action::SubMul => (Sub, self.loaded(c, SECOND), FIRST.into()),
             Action::SubMulMul => {
-                let c = self.operand(c);
+                let c = self.place(c);
                 self.list.apply(Mul, FIRST, FIRST, c);
                 (Sub, self.loaded(d, SECOND), FIRST.into())
             }
@@ -217,7 +189,7 @@ impl Writer {
             }
             Action::SquareAdd => {
                 self.apply(Mul, FIRST, a, a);
-                (Add, FIRST, self.operand(b))
+                (Add, FIRST, self.place(b).into())
             }
             Action::Unary(Unary::Power(n @ 3..=16)) => {
                 let a = self.loaded(a, SECOND);

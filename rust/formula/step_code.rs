@@ -6,7 +6,7 @@
 use super::Leaf;
 use super::compile::{Compiled, FIRST, INTERPRETED, SECOND, Writer};
 use super::program::Program;
-use crate::machine::{Listing, Operation};
+use crate::machine::{Array, Listing, Operation, Place};
 use crate::scalar::{Isa, Scalar};
 use crate::sides::Sides;
 
@@ -33,35 +33,30 @@ pub struct StepFrom<'a, S> {
 /// The most operations: longer code is not in the cache when it is needed.
 const MOST_LINES: usize = 1 << 12;
 
-/// The numbers of the values of a step. The first ones belong to the program's registers.
-struct Values {
+/// The places of the values of a step in the work: first the results, last the program's registers.
+struct Layout {
     states: usize,
-    stages: usize,
-    x: usize,
     new: usize,
+    x: usize,
     t: usize,
     h: usize,
+    registers: usize,
 }
 
-impl Values {
-    fn of(registers: usize, states: usize, stages: usize) -> Self {
-        let x = registers + stages * states;
-        let new = x + states;
-        let t = new + states;
-        Self { states, stages: registers, x, new, t, h: t + 1 }
+impl Layout {
+    fn of(states: usize, stages: usize) -> Self {
+        let new = stages * states;
+        let (x, t) = (new + states, new + 2 * states);
+        Self { states, new, x, t, h: t + 1, registers: t + 2 }
     }
 
-    fn len(&self) -> usize {
-        self.h + 1
-    }
-
-    fn stage(&self, i: usize, n: usize) -> usize {
-        self.stages + i * self.states + n
+    fn stage(&self, i: usize, n: usize) -> Place {
+        work(i * self.states + n)
     }
 }
 
-fn number(i: usize) -> u16 {
-    u16::try_from(i).expect("fewer than 65536 values")
+fn work(at: usize) -> Place {
+    Place(Array::Work, at)
 }
 
 impl Program {
@@ -79,21 +74,21 @@ impl Program {
     ) -> bool {
         let make = |lanes| if lanes == 1 { self.step_code(weights) } else { None };
         let Some(code) = self.step_codes.get::<S>(weights.number, INTERPRETED, make) else { return false };
-        let values = Values::of(fixed.len(), new.len(), weights.c.len());
+        let layout = Layout::of(new.len(), weights.c.len());
+        let (states, registers) = (new.len(), layout.registers);
         let mut run = |work: &mut [S]| {
             if code.is_interrupted() {
-                work[..fixed.len()].copy_from_slice(fixed);
+                work[registers..][..fixed.len()].copy_from_slice(fixed);
             }
-            let (first, x) = (values.stages, values.x);
-            work[first..first + new.len()].copy_from_slice(&stages[..new.len()]);
-            work[x..x + new.len()].copy_from_slice(from.x);
-            (work[values.t], work[values.h]) = (from.t, from.h);
+            work[..states].copy_from_slice(&stages[..states]);
+            work[layout.x..layout.t].copy_from_slice(from.x);
+            (work[layout.t], work[layout.h]) = (from.t, from.h);
             code.follow(self, fixed, sides, work);
-            stages.copy_from_slice(&work[first..x]);
-            new.copy_from_slice(&work[values.new..values.t]);
+            stages.copy_from_slice(&work[..layout.new]);
+            new.copy_from_slice(&work[layout.new..layout.x]);
         };
         // Arrays on the stack save an allocation in each step.
-        match values.len() {
+        match registers + fixed.len() {
             0..=48 => run(&mut [S::zero(); 48]),
             49..=96 => run(&mut [S::zero(); 96]),
             97..=192 => run(&mut [S::zero(); 192]),
@@ -109,44 +104,47 @@ impl Program {
             return None;
         }
         let (count, states) = (weights.c.len(), self.len());
-        let values = Values::of(self.room(), states, count);
+        let layout = Layout::of(states, count);
         let mut held = vec![false; self.room()];
         held[self.states + leaves.len()..self.states + self.leaves.len()].fill(true);
         for step in &self.first {
             held[usize::from(step.to)] = true;
         }
-        let mut writer = Writer::new(Listing::new(Isa::best(), 1), held);
+        let mut writer = Writer::new(Listing::new(Isa::best(), 1), held, layout.registers);
         for i in 1..count {
             let weights_of_stage = &weights.a[i * count..i * count + i];
             let is_last = i + 1 == weights.stages;
             for n in 0..states {
+                let new = work(layout.new + n);
                 if n < self.states {
-                    writer.argument(&values, weights_of_stage, n, n);
+                    let argument = work(layout.registers + n);
+                    writer.argument(&layout, weights_of_stage, n, argument);
                     if is_last {
-                        writer.copy(number(n), number(values.new + n));
+                        writer.copy(argument, new);
                     }
                 } else if is_last {
-                    writer.argument(&values, weights_of_stage, n, values.new + n);
+                    writer.argument(&layout, weights_of_stage, n, new);
                 }
             }
             for at in (self.states..).take(leaves.len()) {
-                writer.time(&values, weights.c[i], at);
+                writer.time(&layout, weights.c[i], work(layout.registers + at));
             }
             writer.steps(&self.steps);
             for (n, &result) in self.results.iter().enumerate() {
-                writer.copy(result, number(values.stage(i, n)));
+                let rate = writer.place(result);
+                writer.copy(rate, layout.stage(i, n));
             }
             if writer.list.len() > MOST_LINES {
                 return None;
             }
         }
-        writer.compiled()
+        writer.compiled(layout.x)
     }
 }
 
 impl Writer {
     /// Writes `x + h Σ_j a_j k_j` in component `n`, without the zero weights after the first.
-    fn argument(&mut self, values: &Values, weights: &[f64], n: usize, to: usize) {
+    fn argument(&mut self, layout: &Layout, weights: &[f64], n: usize, to: Place) {
         for (j, &weight) in weights.iter().enumerate() {
             if j > 0 && weight == 0.0 {
                 continue;
@@ -154,25 +152,20 @@ impl Writer {
             let term = if j == 0 { FIRST } else { SECOND };
             let weight = self.list.constant(weight);
             self.list.load(term, weight);
-            let stage = self.operand(number(values.stage(j, n)));
-            self.list.apply(Operation::Mul, term, term, stage);
+            self.list.apply(Operation::Mul, term, term, layout.stage(j, n));
             if j > 0 {
                 self.list.apply(Operation::Add, FIRST, FIRST, SECOND);
             }
         }
-        let h = self.operand(number(values.h));
-        self.list.apply(Operation::Mul, FIRST, FIRST, h);
-        let x = self.operand(number(values.x + n));
-        self.write(number(to), Operation::Add, FIRST, x);
+        self.list.apply(Operation::Mul, FIRST, FIRST, work(layout.h));
+        self.write(to, Operation::Add, FIRST, work(layout.x + n).into());
     }
 
     /// Writes the time of a stage.
-    fn time(&mut self, values: &Values, part: f64, to: usize) {
+    fn time(&mut self, layout: &Layout, part: f64, to: Place) {
         let part = self.list.constant(part);
         self.list.load(FIRST, part);
-        let h = self.operand(number(values.h));
-        self.list.apply(Operation::Mul, FIRST, FIRST, h);
-        let t = self.operand(number(values.t));
-        self.write(number(to), Operation::Add, FIRST, t);
+        self.list.apply(Operation::Mul, FIRST, FIRST, work(layout.h));
+        self.write(to, Operation::Add, FIRST, work(layout.t).into());
     }
 }

@@ -112,12 +112,18 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
                 // The lowest of several numbers is read from memory.
                 let is_part = known[value].width != width;
                 let stored = if is_part { new(width, &mut known) } else { value };
-                known[stored].home.get_or_insert(place);
-                known[stored].saved |= is_part;
-                if let Some(former) = in_place.insert((place, width), stored)
+                let former = in_place.insert((place, width), stored);
+                // A result's place does not change any more, unlike those of others.
+                let own = &mut known[stored];
+                let is_better = !own.saved && place.1 < results && former.is_none();
+                if own.home.is_none() || is_better {
+                    own.home = Some(place);
+                }
+                own.saved |= is_part;
+                if let Some(former) = former
                     && former != stored
                 {
-                    replaced.push((former, actions.len()));
+                    replaced.push((former, place, actions.len()));
                 }
                 if is_part || place.1 < results || read.contains(&place) {
                     actions.push(Action::Store(width, place, value));
@@ -127,7 +133,7 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
                 actions.push(Action::StoreUpper(place, of(from.into(), &mut known)?));
                 known.push(Known { home: Some(place), saved: true, width: 1, ..Known::default() });
                 if let Some(former) = in_place.insert((place, 1), known.len() - 1) {
-                    replaced.push((former, actions.len()));
+                    replaced.push((former, place, actions.len()));
                 }
             }
             Line::LoadUpper(to, a, place) => {
@@ -156,8 +162,10 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
             known[value].uses.push(i);
         }
     }
-    let is_needed =
-        |&(value, from): &(Value, usize)| known[value].uses.first().is_some_and(|&last| last >= from);
+    let is_needed = |&(value, place, from): &(Value, Place, usize)| {
+        let own = &known[value];
+        own.home == Some(place) && own.uses.first().is_some_and(|&last| last >= from)
+    };
     if replaced.iter().any(is_needed) { None } else { Some((known, actions)) }
 }
 
