@@ -31,14 +31,20 @@ impl Compiled {
         if !self.interpreted.is_empty() {
             work[..program.states].copy_from_slice(&x[..program.states]);
         }
-        self.follow(program, x, sides, work);
+        self.follow(program, x, sides, (work, &mut []));
     }
 
     /// Runs the functions and interprets what is between them.
     #[inline(always)]
-    pub(super) fn follow<S: Scalar>(&self, program: &Program, held: &[S], sides: &Sides<S>, work: &mut [S]) {
+    pub(super) fn follow<S: Scalar>(
+        &self,
+        program: &Program,
+        held: &[S],
+        sides: &Sides<S>,
+        (work, stages): (&mut [S], &mut [S]),
+    ) {
         for i in 0..=self.interpreted.len() {
-            self.code.run(i, work, held, sides);
+            self.code.run_step(i, (&mut *work, &mut *stages), held, sides);
             if let Some(&step) = self.interpreted.get(i) {
                 program.perform(&[step], sides, &mut work[self.registers..]);
             }

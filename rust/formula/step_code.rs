@@ -33,25 +33,30 @@ pub struct StepFrom<'a, S> {
 /// The most operations: longer code is not in the cache when it is needed.
 const MOST_LINES: usize = 1 << 12;
 
-/// The places of the values of a step in the work: first the results, last the program's registers.
+/// The places of the values of a step: the work begins with the new state, and ends with the program's registers.
 struct Layout {
     states: usize,
-    new: usize,
-    x: usize,
     t: usize,
     h: usize,
     registers: usize,
 }
 
 impl Layout {
-    fn of(states: usize, stages: usize) -> Self {
-        let new = stages * states;
-        let (x, t) = (new + states, new + 2 * states);
-        Self { states, new, x, t, h: t + 1, registers: t + 2 }
+    fn of(states: usize) -> Self {
+        let t = 2 * states;
+        Self { states, t, h: t + 1, registers: t + 2 }
+    }
+
+    fn end(n: usize) -> Place {
+        work(n)
+    }
+
+    fn x(&self, n: usize) -> Place {
+        work(self.states + n)
     }
 
     fn stage(&self, i: usize, n: usize) -> Place {
-        work(i * self.states + n)
+        Place(Array::Stages, i * self.states + n)
     }
 }
 
@@ -74,23 +79,26 @@ impl Program {
     ) -> bool {
         let make = |lanes| if lanes == 1 { self.step_code(weights) } else { None };
         let Some(code) = self.step_codes.get::<S>(weights.number, INTERPRETED, make) else { return false };
-        let layout = Layout::of(new.len(), weights.c.len());
-        let (states, registers) = (new.len(), layout.registers);
+        let Layout { states, t, h, registers } = Layout::of(new.len());
         let mut run = |work: &mut [S]| {
             if code.is_interrupted() {
                 work[registers..][..fixed.len()].copy_from_slice(fixed);
             }
-            work[..states].copy_from_slice(&stages[..states]);
-            work[layout.x..layout.t].copy_from_slice(from.x);
-            (work[layout.t], work[layout.h]) = (from.t, from.h);
-            code.follow(self, fixed, sides, work);
-            stages.copy_from_slice(&work[..layout.new]);
-            new.copy_from_slice(&work[layout.new..layout.x]);
+            // In loops: a call of a few numbers' copy takes longer, and so does reading numbers together that were written
+            // one by one.
+            for (x, &start) in work[states..t].iter_mut().zip(from.x) {
+                *x = start;
+            }
+            (work[t], work[h]) = (from.t, from.h);
+            code.follow(self, fixed, sides, (&mut *work, &mut *stages));
+            for (new, &end) in new.iter_mut().zip(&work[..states]) {
+                *new = end;
+            }
         };
         // Arrays on the stack save an allocation in each step.
         match registers + fixed.len() {
-            0..=48 => run(&mut [S::zero(); 48]),
-            49..=96 => run(&mut [S::zero(); 96]),
+            0..=32 => run(&mut [S::zero(); 32]),
+            33..=96 => run(&mut [S::zero(); 96]),
             97..=192 => run(&mut [S::zero(); 192]),
             193..=384 => run(&mut [S::zero(); 384]),
             more => run(&mut vec![S::zero(); more]),
@@ -104,7 +112,7 @@ impl Program {
             return None;
         }
         let (count, states) = (weights.c.len(), self.len());
-        let layout = Layout::of(states, count);
+        let layout = Layout::of(states);
         let mut held = vec![false; self.room()];
         held[self.states + leaves.len()..self.states + self.leaves.len()].fill(true);
         for step in &self.first {
@@ -115,7 +123,7 @@ impl Program {
             let weights_of_stage = &weights.a[i * count..i * count + i];
             let is_last = i + 1 == weights.stages;
             for n in 0..states {
-                let new = work(layout.new + n);
+                let new = Layout::end(n);
                 if n < self.states {
                     let argument = work(layout.registers + n);
                     writer.argument(&layout, weights_of_stage, n, argument);
@@ -138,7 +146,7 @@ impl Program {
                 return None;
             }
         }
-        writer.compiled(layout.x)
+        writer.compiled(states)
     }
 }
 
@@ -158,7 +166,7 @@ impl Writer {
             }
         }
         self.list.apply(Operation::Mul, FIRST, FIRST, work(layout.h));
-        self.write(to, Operation::Add, FIRST, work(layout.x + n).into());
+        self.write(to, Operation::Add, FIRST, layout.x(n).into());
     }
 
     /// Writes the time of a stage.

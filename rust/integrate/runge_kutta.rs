@@ -163,14 +163,9 @@ where
     T: Scheme<N, P>,
     S: Scalar,
 {
-    /// The step by the law's own code for whole steps, with all stages.
+    /// The new state of a step by the law's own code for whole steps, which gives all stages.
     #[inline(always)]
-    fn staged(
-        &mut self,
-        system: &impl System<S, D>,
-        at: &StepStart<S, D>,
-        h: S::Real,
-    ) -> Option<([S; D], [[S; D]; N])> {
+    fn staged(&mut self, system: &impl System<S, D>, at: &StepStart<S, D>, h: S::Real) -> Option<[S; D]> {
         if const { !S::IS_PLAIN || S::Real::LANES > 1 } {
             return None;
         }
@@ -181,10 +176,10 @@ where
             c: &table.c,
             a: table.a.as_flattened(),
         };
-        let mut stages = [self.first; N];
-        let x = system.staged(&weights, (at.t, &at.x, h), &at.sides, &mut stages);
+        self.stages[0] = self.first;
+        let x = system.staged(&weights, (at.t, &at.x, h), &at.sides, &mut self.stages);
         self.extended = x.is_some();
-        Some((x?, stages))
+        x
     }
 
     /// The coefficient of `h θ^(j+1)` in component `n`, of the numbers or of a part of them.
@@ -236,21 +231,22 @@ where
         h: S::Real,
         norm: &impl ErrorNorm<S, D>,
     ) -> Trial<S, D> {
-        let (x, stages) = match self.staged(system, at, h) {
-            Some(step) => step,
-            None => step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides),
-        };
-        let count = T::TABLEAU.stages;
-        let error = combined(&const { &T::TABLEAU }.e, &stages, count, h);
+        let x = self.staged(system, at, h).unwrap_or_else(|| {
+            let (x, stages) = step::<T, S, D, N, P>(system, at.t, &at.x, &self.first, h, &at.sides);
+            self.stages = stages;
+            x
+        });
+        let (stages, count) = (&self.stages, T::TABLEAU.stages);
+        let error = combined(&const { &T::TABLEAU }.e, stages, count, h);
         let mut error = norm.of_step(&error, &at.x, &x);
         if let Some(low) = &const { &T::TABLEAU }.e_low {
             // Hairer's combination, which behaves as h^8.
-            let low = combined(low, &stages, count, h);
+            let low = combined(low, stages, count, h);
             let (square, low) = (error * error, norm.of_step(&low, &at.x, &x));
             let both = square + (low * low).scale(0.01);
             error = S::Real::select(S::Real::zero().less(both), square / both.sqrt(), error);
         }
-        (self.x, self.h, self.stages) = (at.x, h, stages);
+        (self.x, self.h) = (at.x, h);
         Trial { x, size: h, error }
     }
 
@@ -332,7 +328,7 @@ mod tests {
         method.begin(&system, &at, true);
         let mut coded = None;
         for _ in 0..2000 {
-            coded = method.staged(&system, &at, 0.1);
+            coded = method.staged(&system, &at, 0.1).map(|x| (x, method.stages));
         }
         let (x, mut stages) = step::<T, f64, 3, N, P>(&system, at.t, &at.x, &method.first, 0.1, &at.sides);
         for i in T::TABLEAU.stages..N {

@@ -73,6 +73,7 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
     // Values whose places have others from an operation on.
     let mut replaced = Vec::new();
     let mut in_register = [None; 1 << u8::BITS];
+    let is_result = |place: Place| place.0 == Array::Stages || place.1 < results;
     // `LoadUpper` always reads memory, so these places must be stored.
     let upper = |&(_, line): &(usize, Line)| match line {
         Line::LoadUpper(_, _, place) => Some(place),
@@ -115,7 +116,7 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
                 let former = in_place.insert((place, width), stored);
                 // A result's place does not change any more, unlike those of others.
                 let own = &mut known[stored];
-                let is_better = !own.saved && place.1 < results && former.is_none();
+                let is_better = !own.saved && is_result(place) && former.is_none();
                 if own.home.is_none() || is_better {
                     own.home = Some(place);
                 }
@@ -125,7 +126,7 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
                 {
                     replaced.push((former, place, actions.len()));
                 }
-                if is_part || place.1 < results || read.contains(&place) {
+                if is_part || is_result(place) || read.contains(&place) {
                     actions.push(Action::Store(width, place, value));
                 }
             }

@@ -11,7 +11,7 @@ pub(super) fn encode(listing: &Listing) -> Result<(Vec<u8>, Vec<usize>), IcedErr
     let size = |place: Place| if place.0 == Array::Constants { 1 } else { lanes };
     let memory = |place: Place| {
         // The first arguments of a call.
-        let base = [Name::RDI, Name::RSI, Name::RDX, Name::RCX][place.0 as usize];
+        let base = [Name::RDI, Name::RSI, Name::RDX, Name::RCX, Name::R8][place.0 as usize];
         MemoryOperand::with_base_displ(base, 8 * (place.1 * size(place)) as i64)
     };
     let mut encoder = Encoder::try_new(64)?;

@@ -10,10 +10,12 @@ use crate::scalar::Isa;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register(pub u8);
 
-/// An array that code reads, or writes if it is `Work`.
+/// An array that code reads, or writes if it is `Work` or `Stages`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Array {
     Work,
+    /// The rates at the stages of a step.
+    Stages,
     Held,
     /// All bits of a number are set if the side is the upper one.
     Sides,
@@ -92,7 +94,7 @@ pub struct Listing {
     pub(super) constants: Vec<f64>,
     places: HashMap<u64, usize>,
     /// The length that each array but the constants needs, in elements.
-    pub(super) extents: [usize; 3],
+    pub(super) extents: [usize; 4],
 }
 
 impl Listing {
@@ -106,7 +108,7 @@ impl Listing {
         };
         assert!(lanes.is_multiple_of(width), "{lanes} lanes in registers of {width}");
         let (lines, constants, places) = Default::default();
-        Self { lines, isa, width, step: width, lanes, constants, places, extents: [0; 3] }
+        Self { lines, isa, width, step: width, lanes, constants, places, extents: [0; 4] }
     }
 
     /// How many operations there are.
@@ -135,9 +137,9 @@ impl Listing {
         }
     }
 
-    /// Stores a number in the array `Work`.
+    /// Stores a number in the array `Work` or `Stages`.
     pub fn store(&mut self, place: Place, from: Register) {
-        assert_eq!(place.0, Array::Work, "only the work is written");
+        assert!(matches!(place.0, Array::Work | Array::Stages), "other arrays are not written");
         self.checked(place.into());
         self.push(Line::Store(place, from));
     }
@@ -207,7 +209,7 @@ impl Listing {
     }
 
     /// Lets operations find their operands in registers. Elements of the work from `results` on are not needed after a
-    /// function. Returns false if a value is needed after its place has another one.
+    /// function, unlike all stages. Returns false if a value is needed after its place has another one.
     #[must_use]
     pub fn allocate(&mut self, results: usize) -> bool {
         let registers = if self.isa == Isa::Avx512 && self.lanes > 1 { 32 } else { 16 };

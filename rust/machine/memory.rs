@@ -16,11 +16,11 @@ pub struct Code {
     lanes: usize,
     constants: Vec<f64>,
     starts: Vec<usize>,
-    extents: [usize; 3],
+    extents: [usize; 4],
 }
 
 /// The arrays in the order of [`Array`].
-type Entry = unsafe extern "sysv64" fn(*mut f64, *const f64, *const f64, *const f64);
+type Entry = unsafe extern "sysv64" fn(*mut f64, *mut f64, *const f64, *const f64, *const f64);
 
 impl Code {
     /// Puts a listing into memory; `None` if the machine lacks the instructions or the system refuses such memory.
@@ -38,16 +38,34 @@ impl Code {
         Some(Self { memory, step, lanes, constants, starts, extents })
     }
 
-    /// Runs a function, by its number.
+    /// Runs a function of a listing without stages, by its number.
+    ///
+    /// # Panics
+    /// As [`run_step`](Self::run_step).
+    #[inline]
+    pub fn run<S: Scalar>(&self, function: usize, work: &mut [S], held: &[S], sides: &Sides<S>) {
+        self.run_step(function, (work, &mut []), held, sides);
+    }
+
+    /// Runs a function, by its number, with the rates at the stages of a step.
     ///
     /// # Panics
     /// If an array is shorter than the code needs, there is no such function, or the code is for other numbers.
     #[inline]
-    pub fn run<S: Scalar>(&self, function: usize, work: &mut [S], held: &[S], sides: &Sides<S>) {
-        let [work_length, held_length, sides_length] = self.extents;
+    pub fn run_step<S: Scalar>(
+        &self,
+        function: usize,
+        (work, stages): (&mut [S], &mut [S]),
+        held: &[S],
+        sides: &Sides<S>,
+    ) {
+        let [work_length, stages_length, held_length, sides_length] = self.extents;
         assert!(S::IS_PLAIN && S::Real::LANES == self.lanes, "code for other numbers");
         assert!(
-            work_length <= work.len() && held_length <= held.len() && sides_length <= sides.len(),
+            work_length <= work.len()
+                && stages_length <= stages.len()
+                && held_length <= held.len()
+                && sides_length <= sides.len(),
             "arrays that are too short for this code"
         );
         let bits = |side: S::Mask| f64::from_bits(if side.lane(0) { !0 } else { 0 });
@@ -63,6 +81,7 @@ impl Code {
         };
         let start = self.starts[function];
         let (work, held): (*mut f64, *const f64) = (work.as_mut_ptr().cast(), held.as_ptr().cast());
+        let stages: *mut f64 = stages.as_mut_ptr().cast();
         let mut from = 0;
         // A range in steps would divide.
         while from < self.lanes {
@@ -72,7 +91,8 @@ impl Code {
             unsafe {
                 let entry = std::mem::transmute::<*const u8, Entry>(self.memory.as_ptr().add(start));
                 let shifted = |array: *const f64| array.wrapping_add(from);
-                entry(work.wrapping_add(from), shifted(held), shifted(sides), self.constants.as_ptr());
+                let (work, stages) = (work.wrapping_add(from), stages.wrapping_add(from));
+                entry(work, stages, shifted(held), shifted(sides), self.constants.as_ptr());
             }
             from += self.step;
         }

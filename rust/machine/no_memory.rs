@@ -15,4 +15,14 @@ impl Code {
     pub fn run<S: Scalar>(&self, _function: usize, _work: &mut [S], _held: &[S], _sides: &Sides<S>) {
         match *self {}
     }
+
+    pub fn run_step<S: Scalar>(
+        &self,
+        _function: usize,
+        _arrays: (&mut [S], &mut [S]),
+        _held: &[S],
+        _sides: &Sides<S>,
+    ) {
+        match *self {}
+    }
 }
