@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -116,6 +117,24 @@ def test_short_questions_start_no_more_processes_than_cores() -> None:
         try:
             await asyncio.gather(*(ask(k) for k in range(30)))
             assert 1 <= len(started) <= max(2, os.cpu_count() or 1) + 2
+        finally:
+            await pool.close()
+
+    asyncio.run(run())
+
+
+def test_slow_imports_start_no_more_processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """On a busy machine an import takes seconds: that is no long question."""
+    (tmp_path / "sitecustomize.py").write_text("import time; time.sleep(2.0)\n", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+
+    async def run() -> None:
+        pool = Calculators(limits.RUNS)
+        try:
+            asked = [asyncio.create_task(pool.ask(divmod, k, 7)) for k in range(30)]
+            await asyncio.sleep(1.8)
+            assert len(pool._busy) == pool._usual
+            assert await asyncio.gather(*asked) == [divmod(k, 7) for k in range(30)]
         finally:
             await pool.close()
 

@@ -2,7 +2,8 @@
 
 It reads questions from its input and writes answers to its output. Both are the length of a pickle, then the
 pickle. A question has the seconds of processor time that it may take, a function of this package and its
-arguments; a length of zero stops the work. Both come from this package alone, never from a visitor.
+arguments; a length of zero stops the work. The first length in its output is zero: its imports have ended.
+Questions come from this package alone, never from a visitor.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ def main() -> None:
         importlib.import_module(f"{__package__}.{module}")
     if sys.argv[1:] == ["maps"]:
         sys.modules[f"{__package__}.maps"].warm_up()
+    answers.write(LENGTH.pack(0))
+    answers.flush()
     while True:
         stopped, question = questions.get()
         answer = pickle.dumps(_answer(work, stopped, *pickle.loads(question)))

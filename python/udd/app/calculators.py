@@ -151,6 +151,8 @@ class _Calculator:
         self._loop = asyncio.get_running_loop()
         self._killed = False
         self.began = 0.0
+        self._prepared: float | None = None
+        """The time at which its imports had ended."""
         self.stopping = False
         self.size = 0
         """Bytes of its last answer."""
@@ -159,8 +161,10 @@ class _Calculator:
 
     @property
     def age(self) -> float:
-        """Seconds since its question began."""
-        return self._loop.time() - self.began
+        """Seconds of its work at a question; the imports before the first one do not count."""
+        if self._prepared is None:
+            return 0.0
+        return self._loop.time() - max(self.began, self._prepared)
 
     async def start(self) -> None:
         """Start the process, out of reach of the terminal's Ctrl-C: the server ends it."""
@@ -205,6 +209,9 @@ class _Calculator:
         assert self._process is not None and self._process.stdout is not None
         try:
             self._write(pickle.dumps(question))
+            if self._prepared is None:
+                await self._process.stdout.readexactly(LENGTH.size)
+                self._prepared = self._loop.time()
             (size,) = LENGTH.unpack(await self._process.stdout.readexactly(LENGTH.size))
             answer = pickle.loads(await self._process.stdout.readexactly(size))
             self.size = size
