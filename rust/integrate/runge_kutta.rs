@@ -348,6 +348,7 @@ mod tests {
         for texts in [
             ["y - x", "x*z", "a - x*y"],
             ["y", "cos(1.1*t)*a - x^3 - b*sin(y)", "0"],
+            ["-a*sin(y) - 0.04*x - 0.2*sign(x)", "x", "0"],
             ["x*a - t", "abs(x)*y - max(y, z)", "sign(x)*t/(1 + z^2)"],
             ["exp(-x^2)*b", "z", "where(x > y, x^a, sqrt(1 + y^2))"],
         ] {

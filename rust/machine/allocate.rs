@@ -110,9 +110,11 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
             }
             Line::Store(place, from) => {
                 let value = of(from.into(), &mut known)?;
-                // The lowest of several numbers is read from memory.
-                let is_part = known[value].width != width;
-                let stored = if is_part { new(width, &mut known) } else { value };
+                let own = &known[value];
+                // A copy of a place is another value, as that place may change; the lowest of several numbers, too. They are
+                // read from memory.
+                let is_copy = own.width != width || own.saved && own.home != Some(place);
+                let stored = if is_copy { new(width, &mut known) } else { value };
                 let former = in_place.insert((place, width), stored);
                 // A result's place does not change any more, unlike those of others.
                 let own = &mut known[stored];
@@ -120,13 +122,13 @@ fn values(lines: &[(usize, Line)], results: usize) -> Option<(Vec<Known>, Vec<Ac
                 if own.home.is_none() || is_better {
                     own.home = Some(place);
                 }
-                own.saved |= is_part;
+                own.saved |= is_copy;
                 if let Some(former) = former
                     && former != stored
                 {
                     replaced.push((former, place, actions.len()));
                 }
-                if is_part || is_result(place) || read.contains(&place) {
+                if is_copy || is_result(place) || read.contains(&place) {
                     actions.push(Action::Store(width, place, value));
                 }
             }
