@@ -37,7 +37,10 @@ def test_a_rolling_shutter_is_found_and_undone(tmp_path: Path) -> None:
     assert e[0] < 0.2 and e[1] < 0.2 and e[2] < 3  # the limits at twice this resolution
 
 
-def test_a_film_of_which_no_frame_is_measured_is_told(tmp_path: Path, capsys: Any) -> None:
+def test_a_film_of_which_no_frame_is_measured_is_told(
+    tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # the page of a refused film is written there
     film = shot(tmp_path / "brief.mp4", 0.84, (0, 0.001, 0.04, 0), rng=5, defects=Defects(readout=0.8))
     assert main(["fit", str(film.path), "--W", "0.05"]) == 1
     said = capsys.readouterr().err
