@@ -38,7 +38,7 @@ impl Code {
         Some(Self { memory, step, lanes, constants, starts, extents })
     }
 
-    /// Runs a function of a listing without stages, by its number.
+    /// Runs a function of a listing without stages.
     ///
     /// # Panics
     /// As [`run_step`](Self::run_step).
@@ -47,7 +47,7 @@ impl Code {
         self.run_step(function, (work, &mut []), held, sides);
     }
 
-    /// Runs a function, by its number, with the rates at the stages of a step.
+    /// Runs a function with the rates at the stages of a step.
     ///
     /// # Panics
     /// If an array is shorter than the code needs, there is no such function, or the code is for other numbers.

@@ -8,9 +8,9 @@ import threading
 from collections.abc import Callable
 
 
-def interrupting_progress(delay: float = 0.2) -> Callable[[str], None]:
-    """Return a function for `progress` that sends Ctrl-C `delay` seconds after the first finished run."""
-    timer = threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT))
+def interrupting_progress() -> Callable[[str], None]:
+    """Return a function for `progress` that sends Ctrl-C 0.2 s after the first finished run."""
+    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
     timer.daemon = True
 
     def progress(text: str) -> None:

@@ -143,11 +143,11 @@ if __name__ == "__main__":
     try:
         udd.sweep(spec, pool, store=store)
     except udd.Interrupted as stopped:
-        found, said = stopped.partial, str(stopped)
+        partial, said = stopped.partial, str(stopped)
     if pool is not None:
         pool.shutdown()
     print(said)
-    print((found["outcome"] == 0).values.sum(), (found["outcome"] == -1).values.sum())
+    print((partial["outcome"] == 0).values.sum(), (partial["outcome"] == -1).values.sum())
 """
 
 

@@ -45,12 +45,13 @@ class CopiedPixels(Observer):
         total = copied = 0.0
         for u, v in zip(places.real.astype(int), places.imag.astype(int), strict=True):
             part = slice(max(v - about, 0), v + about), slice(max(u - about, 0), u + about)
-            if min(picture[part].shape) < 2:  # a mark at the picture's edge
+            seen = picture[part]
+            if min(seen.shape) < 2:  # a mark at the picture's edge
                 continue
-            down, right = np.gradient(picture[part].astype(np.float32))
+            down, right = np.gradient(seen.astype(np.float32))
             slope = (down**2 + right**2) * self.state.view[part]
             total += float(slope.sum())
-            changed = cv2.dilate((picture[part] != before[part]).astype(np.uint8), BLOCK)
+            changed = cv2.dilate((seen != before[part]).astype(np.uint8), BLOCK)
             copied += float(slope[changed == 0].sum())
         self.share[k] = copied / max(total, 1.0)
         return NOWHERE
