@@ -16,8 +16,13 @@ from film_for_tests import FPS, write
 from udd.cli import main
 from udd.errors import TrackError
 from udd.measurement import Measurement
+from udd.tracking.detection.bob import Background, Blob, BobColour, UsualArea
+from udd.tracking.geometry.pose import Pose
 from udd.tracking.geometry.turns import count_turns_over_the_top
 from udd.tracking.passes.double_pendulum import with_lower_bob
+from udd.tracking.passes.frame_loop import PoseSample, Prediction
+from udd.tracking.passes.pendulum_bob import Bob, circle
+from udd.video.reader import Picture
 
 GREY_WALL, WHITE_WALL, WOODEN_WALL = (140, 145, 140), (225, 222, 215), (190, 150, 105)
 
@@ -91,6 +96,52 @@ def test_a_lower_bob_at_another_distance_is_not_the_bob() -> None:
     assert not m.seen[20:27].any() and m.flag[26].startswith("lost")
     good = m.seen
     np.testing.assert_allclose(m["th2"][good], angle[good], atol=1e-9)
+
+
+def test_a_lower_bob_at_almost_its_distance_is_not_the_bob() -> None:
+    """A piece of a blue shirt, 6 pixels off the circle, was the bob: 1.28 rad off without a flag."""
+    t = np.arange(60) / FPS
+    angle = 0.9 * np.sin(5.0 * t)
+    first = np.full(60, 100.0 + 100.0j)
+    second = first + 105 * (np.sin(angle) + 1j * np.cos(angle))
+    second += 0.3 * np.random.default_rng(1).normal(size=60)
+    second[26] = first[26] + 99
+    column = np.zeros((60, 1))
+    upper = Measurement(t, column, column + 1e-3, None, np.array([""] * 60), {}, ["theta"])
+    m = with_lower_bob(upper, first, second, 590.0, "film")
+    assert m.flag[26].startswith("lost") and m.seen.sum() == 59
+
+
+def test_patches_of_a_shirt_do_not_move_the_pivot() -> None:
+    """One patch 250 pixels away moved it by 24 pixels."""
+    angle = 0.5 * np.cos(5.0 * np.arange(90) / FPS)
+    points = 158 + 61j + 125 * (np.sin(angle) + 1j * np.cos(angle))
+    points += 0.2 * np.random.default_rng(1).normal(size=(90, 2)) @ [1, 1j]
+    points[:3] = 310 + 17j, 305 + 160j, 20 + 380j
+    path = circle(points)
+    assert abs(path.centre - (158 + 61j)) < 3 and abs(path.radius - 125) < 3
+    assert (np.abs(path.rest[:3]) > 20).all()
+
+
+def test_the_patch_of_the_bobs_size_near_its_last_place_is_the_bob() -> None:
+    """The largest patch of its colour was, such as a stripe of a shirt."""
+
+    def picture(boxes: list[tuple[int, int, int, int]]) -> Picture:
+        y, u = np.full((200, 240), 120, np.uint8), np.full((100, 120), 128, np.uint8)
+        for row, column, height, width in boxes:
+            y[row : row + height, column : column + width] = 80
+            u[row // 2 : (row + height) // 2, column // 2 : (column + width) // 2] = 190
+        return Picture(0, 0.0, y, u, np.full((100, 120), 128, np.uint8))
+
+    behind = Background(picture([]), 1.0, np.ones((100, 120), dtype=bool), True)
+    bob = Bob(behind, BobColour.of((30, 70, 190), np.array([62.0, 0.0]), True), UsualArea(24.0**2, 0.01))
+    place = Pose(60.5 + 80.5j, 0.0)
+    expected = Prediction(0.04, [PoseSample(0.0, place)], place)
+    shirt = [(20 * k, 150, 14, 60) for k in range(6)] + [(120, 150, 24, 25), (160, 150, 24, 25)]
+    (seen,) = bob.attempts(lambda _: picture([]), picture([*shirt, (70, 50, 24, 24)]), expected)
+    assert isinstance(seen, Blob) and abs(seen.centre - (61.5 + 81.5j)) < 1
+    (why,) = bob.attempts(lambda _: picture([]), picture(shirt[:6]), expected)
+    assert isinstance(why, str) and "too large" in why
 
 
 def test_whole_turns_in_a_gap_are_in_doubt_only_over_the_top() -> None:

@@ -26,6 +26,7 @@ HUE, BRIGHTNESS = 2.0, 0.5  # weights of differences: lamps change the brightnes
 MOST_OTHER = 70.0  # weighted codes by which a pale bob may differ from the colour that was given
 THIN = 0.5  # of the radius of a pale bob: thinner parts, as a rod, do not belong to it
 FEWEST = 5  # pictures of the survey that must show the bob
+UNSEEN = "the bob is not seen"
 HALF_HIDDEN = 0.93  # share of the size in the last frames below which the middle is not the bob's
 TOO_MUCH = 1.15  # and above which something else of its colour is there
 LEAST, MOST = 0.87, 1.2  # the same of the size in the whole film
@@ -146,8 +147,6 @@ class UsualArea:
 
     def unlike(self, area: float, recent: Iterable[float | None]) -> str:
         """Return why a patch is no whole bob, or an empty text; light changes its size slowly."""
-        if not area:
-            return "the bob is not seen"
         seen = [a for a in recent if a is not None]
         usual = float(np.median(seen)) if seen else self.size
         spread = min(WITHIN * self.scatter, WIDEST)
@@ -166,31 +165,38 @@ def usual_area(film: Film, some: Sequence[Picture], behind: Background, colour: 
     TrackError
         No bob of that colour moves in the film.
     """
-    blobs_seen = [locate_bob(p, behind, colour) for p in some]
-    areas = [blob.area for blob in blobs_seen if blob is not None]
+    areas = [seen[0].area for seen in (locate_bobs(p, behind, colour) for p in some) if seen]
     if len(areas) < FEWEST:
         raise TrackError(f"{film.path}: no bob of that colour moves in this film; {_moving(some, behind)}")
     size = float(np.median(areas))
     return UsualArea(size, 1.48 * float(np.median(np.abs(np.array(areas) / size - 1))))
 
 
-def locate_bob(picture: Picture, behind: Background, colour: BobColour) -> Blob | None:
-    """Return the middle of the largest patch of the colour, weighted by the bob's share of each pixel.
-
-    A pixel's share is the part of the way from the background's light to the bob's, in three colours.
-    """
-    import cv2
-
+def locate_bobs(picture: Picture, behind: Background, colour: BobColour) -> list[Blob]:
+    """Return the patches of the colour, the largest first; something else may have it, too."""
     excess = _pale_excess(picture, behind, colour) if colour.pale else _excess(picture, behind, colour)
     strong = excess > STRONG
     if colour.pale:
         thick = _thickest(strong, SMALL // 4)
         strong = np.zeros_like(strong) if thick is None else thick
         excess = np.where(strong, excess, np.float32(0))
-    patches: Blobs = blobs(strong, SMALL // 4, 1)
-    if not len(patches.centre):
-        return None
-    middle, reach = complex(patches.centre[0]), 0.5 * np.sqrt(patches.area[0]) * 1.6 + 8
+    patches: Blobs = blobs(strong, SMALL // 4)
+    measured = [
+        _measured(picture, behind, excess, complex(centre), 0.8 * float(np.sqrt(area)) + 8)
+        for centre, area in zip(patches.centre, patches.area, strict=True)
+    ]
+    return [blob for blob in measured if blob is not None]
+
+
+def _measured(
+    picture: Picture, behind: Background, excess: NDArray[np.float32], middle: complex, reach: float
+) -> Blob | None:
+    """Return the middle of a patch, weighted by the bob's share of each pixel; None if it is too small.
+
+    A pixel's share is the part of the way from the background's light to the bob's, in three colours.
+    """
+    import cv2
+
     r0, r1 = max(0, int(middle.imag - reach)) & ~1, min(picture.y.shape[0], int(middle.imag + reach) + 1)
     c0, c1 = max(0, int(middle.real - reach)) & ~1, min(picture.y.shape[1], int(middle.real + reach) + 1)
     shape, half = (r1 - r0, c1 - c0), (slice(r0 // 2, (r1 + 1) // 2), slice(c0 // 2, (c1 + 1) // 2))

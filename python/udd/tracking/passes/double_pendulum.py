@@ -12,8 +12,19 @@ from udd.tracking.geometry.turns import count_turns_over_the_top, in_doubt
 from udd.video.reader import TrackError
 
 NAMES = ("th1", "th2")
-ASTRAY = 8.0  # times the usual scatter of the distance, beyond the bob's radius: something else
+ASTRAY = 8.0  # times the usual scatter of the distance, beyond ...
+HIDDEN = 0.2  # ... of the bob's radius, as a bob that is partly hidden: something else
 RIGID = 0.03  # of the distance of the bobs by which it may change
+
+
+def scatter(rest: NDArray[np.float64]) -> float:
+    """Return the usual scatter of distances [pixels], which outliers do not change; NaN are left out."""
+    return 1.48 * float(np.nanmedian(np.abs(rest - np.nanmedian(rest))))
+
+
+def is_astray(rest: NDArray[np.float64], area: float) -> NDArray[np.bool_]:
+    """Return True for distances, less the usual one, at which a bob with this area [pixels] cannot be."""
+    return np.asarray(np.abs(rest) > HIDDEN * np.sqrt(area / np.pi) + ASTRAY * scatter(rest))
 
 
 def with_lower_bob(
@@ -48,16 +59,16 @@ def with_lower_bob(
     arm = second - first
     length = float(np.median(np.abs(arm[seen])))
     off = np.abs(arm) - length
-    scatter = 1.48 * float(np.median(np.abs(off[seen])))
-    if scatter > RIGID * length:
+    spread = scatter(off[seen])
+    if spread > RIGID * length:
         raise TrackError(
-            f"{name}: the distance of the bobs changes by {scatter:.1f} of {length:.0f} pixels: are they the "
+            f"{name}: the distance of the bobs changes by {spread:.1f} of {length:.0f} pixels: are they the "
             "two bobs of one double pendulum, the upper one named first?"
         )
-    seen &= np.abs(off) < np.sqrt(area / np.pi) + ASTRAY * scatter
+    seen &= ~is_astray(off, area)
     turns = count_turns_over_the_top(upper.t, np.where(seen, np.arctan2(arm.real, arm.imag), np.nan))
     values = np.column_stack([upper["theta"], turns.angle])
-    sigma = np.column_stack([upper["sigma_theta"], np.where(seen, max(scatter, 0.01) / length, np.nan)])
+    sigma = np.column_stack([upper["sigma_theta"], np.where(seen, max(spread, 0.01) / length, np.nan)])
     values[~seen] = sigma[~seen] = np.nan
     flag = [
         said or ("" if ok else "lost: a bob is not seen, or partly hidden, or something else has its colour")

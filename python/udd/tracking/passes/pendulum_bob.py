@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,13 @@ from udd.measurement import PENDULUM, Measurement, check_length
 from udd.tracking.calibration.exposure import at_middle
 from udd.tracking.correction import applied
 from udd.tracking.detection.bob import (
+    UNSEEN,
     Background,
     Blob,
     BobColour,
     UsualArea,
     bob_colour,
-    locate_bob,
+    locate_bobs,
     usual_area,
 )
 from udd.tracking.detection.camera_motion import CameraMotion
@@ -30,7 +31,7 @@ from udd.tracking.geometry.turns import count_turns_over_the_top, in_doubt
 from udd.tracking.options import TrackOptions
 from udd.video.reader import Film, Picture, TrackError
 
-from .double_pendulum import ASTRAY, with_lower_bob
+from .double_pendulum import is_astray, scatter, with_lower_bob
 from .frame_loop import Corrected, PoseSample, Prediction, Target, follow
 from .frame_quality import remarks
 from .inserted_copies import inserted_copies
@@ -43,6 +44,7 @@ PLACED = 0.5  # pixels: a small bob's middle is known no better
 SCATTERS = 4.0  # ... if that is so many times the frames' own scatter
 BENDS = 6  # degree of the polynomial by which lens and tilt change the distance
 FEWEST = 10  # frames that show the bob
+TRIPLES = 200  # three points whose circle is tried
 MOVED = 3.0  # pixels: a bob that was to move by less may look like a copy
 STRAIGHT = 0.005  # of a path's length by which a lens may bend a straight one
 SURE = 0.02  # of the length by which the pivot may be unsure
@@ -108,11 +110,14 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
     def attempts(
         self, corrected: Corrected, picture: Picture, expected: Prediction | None
     ) -> Iterator[Blob | str]:
-        """Find the largest patch of the bob's colour."""
-        blob = locate_bob(picture, self.behind, self.colour)
-        why = self.usual.unlike(0.0 if blob is None else blob.area, self.areas)
-        self.areas.append(None if why or blob is None else blob.area)
-        yield why or blob or ""
+        """Find the patch of the bob's colour and size that is nearest to where the bob is expected."""
+        patches = locate_bobs(picture, self.behind, self.colour)
+        why = [self.usual.unlike(blob.area, self.areas) for blob in patches]
+        fits = [blob for blob, unlike in zip(patches, why, strict=True) if not unlike]
+        if expected is not None:
+            fits.sort(key=lambda blob: abs(blob.centre - expected.pose.centre))
+        self.areas.append(fits[0].area if fits else None)
+        yield fits[0] if fits else why[0] if why else UNSEEN
 
     def sample(self, seen: Blob, expected: Prediction | None, t: float) -> PoseSample:
         """Return the place of a result."""
@@ -124,16 +129,34 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
 
 
 def circle(points: NDArray[np.complex128]) -> Circle:
-    """Fit a circle through points by least squares of the distances; outliers count less."""
+    """Fit a circle through points by least squares of the distances; outliers count less.
+
+    It starts from the circle through three points from which the others have the least median distance:
+    patches far off, as of a shirt of the bob's colour, moved the centre by a fifth of the radius.
+    """
     from scipy.optimize import least_squares
 
-    u, v = points.real - points.real.mean(), points.imag - points.imag.mean()
-    a, b, c = np.linalg.lstsq(np.column_stack([u, v, np.ones(len(u))]), u**2 + v**2, rcond=None)[0]
-    start = [a / 2, b / 2, np.sqrt(max(c + a * a / 4 + b * b / 4, 1.0))]
-    fit = least_squares(lambda p: np.hypot(u - p[0], v - p[1]) - p[2], start, loss="soft_l1", f_scale=0.2)
-    rest = np.hypot(u - fit.x[0], v - fit.x[1]) - fit.x[2]
-    spread = np.linalg.pinv(fit.jac.T @ fit.jac) * float(np.mean(np.minimum(rest**2, 1.0)))
-    centre = complex(fit.x[0] + points.real.mean(), fit.x[1] + points.imag.mean())
+    first, second, third = points[np.random.default_rng(0).integers(len(points), size=(TRIPLES, 3))].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = (third - first) / (second - first)
+        centres = first + (second - first) * (ratio - np.abs(ratio) ** 2) / (2j * ratio.imag)
+    centres = centres[np.isfinite(centres)]
+    away = np.abs(points - centres[:, None])
+    rests = away - np.median(away, axis=1)[:, None]
+    best = int(np.argmin(np.median(np.abs(rests), axis=1)))
+    middle = points.mean()
+    start = centres[best] - middle
+    usual = points[~is_astray(rests[best], 0.0)] - middle
+    u, v = usual.real, usual.imag
+    fit = least_squares(
+        lambda p: np.hypot(u - p[0], v - p[1]) - p[2],
+        [start.real, start.imag, float(np.median(away[best]))],
+        loss="soft_l1",
+        f_scale=0.2,
+    )
+    centre = complex(fit.x[0], fit.x[1]) + middle
+    rest = np.abs(points - centre) - fit.x[2]
+    spread = np.linalg.pinv(fit.jac.T @ fit.jac) * float(np.mean(np.minimum(fit.fun**2, 1.0)))
     return Circle(
         centre,
         float(fit.x[2]),
@@ -214,14 +237,12 @@ def _wandering(at: NDArray[np.complex128], path: Circle) -> float:
     return off if off > SCATTERS * scatter else 0.0
 
 
-def _check_hanging(
-    film: Film, at: NDArray[np.complex128], path: Circle, scatter: float, unsure: bool
-) -> None:
+def _check_hanging(film: Film, at: NDArray[np.complex128], path: Circle, off: float, unsure: bool) -> None:
     """Refuse a path that is almost straight, or above its centre: no bob hangs so."""
     along = (path.centre - at.mean()) * 1j
     chord = float(np.ptp((at * np.conj(along / abs(along))).real))
     bend = chord**2 / (8 * path.radius)
-    if chord < path.radius and max(bend, scatter) < STRAIGHT * chord:
+    if chord < path.radius and max(bend, off) < STRAIGHT * chord:
         raise TrackError(
             f"{film.path}: the bob's path is almost straight: it bends by {bend:.1f} of {chord:.0f} pixels, "
             "as a lens bends a line. A rolling object is no pendulum; if this is one, give pivot=(u, v)"
@@ -242,7 +263,9 @@ def _pendulum(
     open_for, open_sigma, given = bob.exposure, bob.exposure_sigma, options.calibrate.given("exposure")
     seen = np.isfinite(at)
     path = circle(at[seen])
-    off = 1.48 * float(np.median(np.abs(path.rest - np.median(path.rest))))
+    on_it = ~is_astray(path.rest, bob.usual_area)
+    seen[seen], path = on_it, replace(path, rest=path.rest[on_it])
+    off = scatter(path.rest)
     wanders = _wandering(at[seen], path)
     unsure = options.pivot is None and path.sigma[0] > SURE * path.radius
     if options.pivot is None:
@@ -266,7 +289,7 @@ def _pendulum(
     else:
         radius = path.radius
     rest = np.abs(at - pivot) - radius
-    astray = seen & (np.abs(rest) > np.sqrt(bob.usual_area / np.pi) + ASTRAY * off)
+    astray = is_astray(rest, bob.usual_area)
     at[astray] = complex(np.nan, np.nan)
     flag = [
         lost("what has the bob's colour is not on its path") if a else f
