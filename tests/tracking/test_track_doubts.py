@@ -166,6 +166,17 @@ def test_a_factor_near_a_whole_number_is_one(factor: float, sigma: float, expect
     assert _rational(factor, sigma) == expected
 
 
+def test_the_release_of_a_disk_that_falls_is_no_slow_part() -> None:
+    """The drive of that step was a clock 27 times too slow, and the times after it were wrong."""
+    stamps = np.arange(0, 4, 1 / 30)
+    centre, angle, _ = seen(stamps, 1)
+    for part in (0.05, 0.1, 0.2, 0.4):  # of the drive that the step of the release shows
+        before = np.sqrt((1 - part) * DRIVE / 30 / 4.9)  # seconds of fall in that step
+        fallen = np.maximum(stamps - stamps[-4] + before, 0.0)
+        falling = centre + 4.9j * SCALE * np.where(np.arange(len(stamps)) < len(stamps) - 4, 0, fallen) ** 2
+        assert slow_parts(stamps, falling + 100 + 200j, angle, 0.08, SCALE) == []
+
+
 @pytest.mark.parametrize("kind", ["even", "step", "swaying"])
 def test_a_drive_that_varies_is_no_clock(kind: str) -> None:
     t, fine = np.arange(0, 10, 1 / 30), np.arange(0, 10, 1e-4)

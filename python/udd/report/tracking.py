@@ -157,8 +157,8 @@ def _each_frame(m: Measurement, detail: Tracking | None) -> Section:
 def _rolls(checked: Health | None) -> Section:
     if checked is None:
         said = (
-            "This motion (short, or a steady rotation) does not determine the contact and the drive, so "
-            "rolling cannot be tested."
+            "This motion (short, a steady rotation, or with a moving camera) does not determine the contact "
+            "and the drive, so rolling cannot be tested."
         )
         return Section("Does it roll?", (Paragraph(said),))
     left, noise = (wording.length(x, "m") for x in (checked.rms, checked.noise))

@@ -70,8 +70,8 @@ def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOp
     guess = support(state.view)
     if guess is None:
         raise TrackError(
-            "the motion does not determine the contact point (the disk hardly turns, or turns steadily) "
-            "and no support is seen: give pivot=(u, v) in pixels"
+            "the motion does not determine the contact point (the disk hardly turns, turns steadily, or the "
+            "camera moves) and no support is seen: give pivot=(u, v) in pixels"
         )
     return camera(complex(state.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
 

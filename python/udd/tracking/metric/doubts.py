@@ -53,9 +53,9 @@ def doubts(gravity: ApparentGravity | None, camera: Camera, fps: float, turns: i
     sentences = []
     if camera.pivot_from == "support":
         sentences.append(
-            "the motion does not determine the contact point (the disk hardly turns, or turns steadily); "
-            f"it is taken from the support, to about {1e3 * camera.pivot_sigma:.0f} mm: give pivot=(u, v) in "
-            "pixels"
+            "the motion does not determine the contact point (the disk hardly turns, turns steadily, or the "
+            f"camera moves); it is taken from the support, to about {1e3 * camera.pivot_sigma:.0f} mm: give "
+            "pivot=(u, v) in pixels"
         )
         gravity = None  # its lever is the distance from the contact
     if turns:

@@ -86,7 +86,10 @@ def slow_parts(
     driven = np.flatnonzero(median_filter(speed, SMOOTH, mode="nearest") > STOPPED * np.median(np.abs(speed)))
     if len(driven) < 2 * WINDOW:
         return []
-    speed, good = speed[: driven[-1] + 1], good[: driven[-1] + 2]  # without the fall of an ejected disk
+    end = driven[-1] + 1
+    if end < len(speed):
+        end -= SMOOTH // 2  # the filter does not show in which step the wheels lost the disk that falls then
+    speed, good = speed[:end], good[: end + 1]
     usual, noise = float(np.median(np.abs(speed))), _noise(speed)
     if not usual > 0 or noise > NOISE * float(np.quantile(speed, 0.9)):
         return []

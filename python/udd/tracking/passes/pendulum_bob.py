@@ -131,8 +131,9 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
 def circle(points: NDArray[np.complex128]) -> Circle:
     """Fit a circle through points by least squares of the distances; outliers count less.
 
-    It starts from the circle through three points from which the others have the least median distance:
-    patches far off, as of a shirt of the bob's colour, moved the centre by a fifth of the radius.
+    It starts from the circle through three points from which the others have the least median distance.
+    A start from all points let one patch, of a shirt in the bob's colour, move the centre by a fifth of the
+    radius.
     """
     from scipy.optimize import least_squares
 
