@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::integrate::{Failure, Steps};
 use crate::scalar::vector;
 
-/// The run is looked at after so many steps.
+/// The run is looked at when it has taken so many more steps.
 const EVERY: u64 = 1000;
 /// It is stiff where it was found held down so many times in a row.
 const HELD: u32 = 15;
@@ -39,7 +39,8 @@ impl Stiffness {
 
 /// The state of the test during the run.
 pub struct Look<const D: usize> {
-    steps: u64,
+    /// The number of steps after which the run is looked at.
+    next: u64,
     held: u32,
     /// About the direction in which states that differ come together fastest.
     direction: [f64; D],
@@ -48,7 +49,7 @@ pub struct Look<const D: usize> {
 impl<const D: usize> Look<D> {
     pub fn new() -> Self {
         // Any direction that no symmetry singles out.
-        Self { steps: 0, held: 0, direction: vector!(f64, D; n => 1.0 + 0.618 * n as f64) }
+        Self { next: EVERY, held: 0, direction: vector!(f64, D; n => 1.0 + 0.618 * n as f64) }
     }
 
     /// Looks at the last step of a run; most steps are not worth it.
@@ -57,10 +58,11 @@ impl<const D: usize> Look<D> {
     /// derivatives in place of a quotient of two stages, so that it serves every method.
     #[inline]
     pub fn at(&mut self, run: &dyn Steps<D>, found: &Stiffness) -> Result<(), Failure> {
-        self.steps += 1;
-        if !self.steps.is_multiple_of(EVERY) || found.recognised().is_some() {
+        let steps = run.counts().accepted;
+        if steps < self.next || found.recognised().is_some() {
             return Ok(());
         }
+        self.next = steps + EVERY;
         let held = run.size().abs() * self.decay(run) > PART * run.stable();
         self.held = if held { self.held + 1 } else { 0 };
         if self.held == HELD {

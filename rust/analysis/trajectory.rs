@@ -170,9 +170,6 @@ pub(in crate::analysis) fn follow<const D: usize>(
             look.at(run, stiffness)?;
         }
         wanted = see(run, ending)?;
-        if stiffness.is_some() {
-            wanted = EACH;
-        }
         if let Some(outcome) = outcome {
             return Ok(outcome);
         }

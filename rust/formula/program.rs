@@ -182,6 +182,15 @@ impl Program {
         })
     }
 
+    /// The component of the state that the only result is, if it is one: most surfaces are.
+    #[inline(always)]
+    pub fn component(&self) -> Option<usize> {
+        match self.results[..] {
+            [at] => Some(usize::from(at)).filter(|&n| n < self.states),
+            _ => None,
+        }
+    }
+
     /// Computes the values that depend on parameters alone, for [`run`](Program::run): all registers as a run begins with
     /// them.
     ///
@@ -199,11 +208,8 @@ impl Program {
     /// If the place lacks what the formulas take, or the results have no room.
     #[inline(always)]
     pub fn run<S: Scalar>(&self, place: &Place<'_, S>, fixed: &[S], sides: &Sides<S>, results: &mut [S]) {
-        // Most surfaces are a component of the state.
-        if let &[at] = &self.results[..]
-            && usize::from(at) < self.states
-        {
-            results[0] = place.x[usize::from(at)];
+        if let Some(n) = self.component() {
+            results[0] = place.x[n];
             return;
         }
         // Plain numbers are dispatched faster than their registers are checked.

@@ -14,7 +14,7 @@ use super::method::{Course, Method};
 use super::root::bracketed;
 use super::zeros::{Bracket, Curve, Polynomials, Search, resolved, sign_changes, time};
 use crate::model::{
-    EnclosedSurfaces, MOST_PROBES, Probes, Sides, StepStart, System, TARGETS, Targets, WALL, choose,
+    EnclosedSurfaces, MOST_PROBES, Probes, Sides, StepStart, System, TARGETS, Targets, WALL, choose, suspects,
 };
 use crate::scalar::{Enclosed, Mask, Real, Scalar, vector};
 use crate::tolerance::Tolerance;
@@ -99,12 +99,8 @@ where
     pub fn look<K: Method<S, D>>(&self, method: &K, h: S::Real, lanes: S::Mask) -> Look<S, D> {
         let probes = method.along(h, K::PROBES, &self.targets.system.watched());
         let mut suspect = [S::mask(false); TARGETS];
-        self.targets.system.suspect(
-            self.targets.at,
-            self.targets.wall,
-            &Probes { h, parts: K::PROBES, states: &probes },
-            &mut suspect,
-        );
+        let places = Probes { h, parts: K::PROBES, states: &probes };
+        suspects(&self.targets, &places, &mut suspect);
         for suspect in &mut suspect {
             *suspect = suspect.and(lanes);
         }
@@ -141,11 +137,11 @@ where
             let mut scale = magnitude(start);
             let (mut low, mut high) = ((zero, start), (zero, zero));
             let (mut wrong, mut early) = (never, never);
+            let probes = Probes { h, parts: method.probes(), states: &look.probes };
+            let along = self.targets.along(target, &probes);
             let mut values = [start; MOST_PROBES + 1];
-            for (i, &theta) in method.probes().iter().enumerate() {
-                let dt = h.scale(theta);
-                let x = vector!(S, D; n => S::lift(look.probes[i][n]));
-                let value = self.targets.value(target, self.targets.at.t + dt, &x);
+            for (i, &theta) in probes.parts.iter().enumerate() {
+                let (dt, value) = (h.scale(theta), along[i]);
                 scale = scale.max(magnitude(value));
                 values[i + 1] = value;
                 let new = value.less(zero).and(wrong.not());

@@ -1,6 +1,6 @@
 //! A system whose type is forgotten.
 
-use super::{EnclosedSurfaces, Piece, Probes, Sides, StepStart, System, TARGETS};
+use super::{EnclosedSurfaces, MOST_PROBES, Piece, Probes, Sides, StepStart, System};
 use crate::formula::StageWeights;
 use crate::scalar::Scalar;
 
@@ -30,13 +30,12 @@ pub trait AnySystem<S: Scalar, const D: usize>: Sync {
     fn next_knot(&self, t: S::Real, sides: &Sides<S>, end: S::Real) -> Option<f64>;
     fn clock_side(&self, t: S::Real, forwards: bool) -> bool;
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S>;
-    fn suspect(
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    );
+    ) -> [S::Real; MOST_PROBES];
 }
 
 impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
@@ -94,14 +93,13 @@ impl<S: Scalar, const D: usize, M: System<S, D>> AnySystem<S, D> for M {
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
         System::input(self, k, t, sides)
     }
-    fn suspect(
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    ) {
-        System::suspect(self, at, wall, probes, found);
+    ) -> [S::Real; MOST_PROBES] {
+        System::surface_along(self, j, at, probes)
     }
 }
 
@@ -160,13 +158,12 @@ impl<S: Scalar, const D: usize> System<S, D> for &dyn AnySystem<S, D> {
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
         AnySystem::input(&**self, k, t, sides)
     }
-    fn suspect(
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    ) {
-        AnySystem::suspect(&**self, at, wall, probes, found);
+    ) -> [S::Real; MOST_PROBES] {
+        AnySystem::surface_along(&**self, j, at, probes)
     }
 }

@@ -1,6 +1,6 @@
 //! One of two models of the same dimension.
 
-use super::{EnclosedSurfaces, Family, Parameter, Piece, Probes, Sides, StepStart, System, TARGETS};
+use super::{EnclosedSurfaces, Family, MOST_PROBES, Parameter, Piece, Probes, Sides, StepStart, System};
 use crate::formula::StageWeights;
 use crate::scalar::Scalar;
 
@@ -97,14 +97,13 @@ where
         ask!(self, model => model.input(k, t, sides))
     }
     #[inline(always)]
-    fn suspect(
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    ) {
-        ask!(self, model => model.suspect(at, wall, probes, found));
+    ) -> [S::Real; MOST_PROBES] {
+        ask!(self, model => model.surface_along(j, at, probes))
     }
 }
 

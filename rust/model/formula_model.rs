@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::sliding_mode::{self, SlidingSurface};
-use super::steady_surfaces::{Places, SteadySurfaces};
+use super::surface_along::{self, Places};
 use super::{
-    EnclosedSurfaces, Family, Inputs, MAX_SURFACES, Observation, Parameter, Piece, Probes, Sides, Signals,
-    StepStart, System, TARGETS, choose, enclosed, parameter, sides_of, suspect_in_turn,
+    EnclosedSurfaces, Family, Inputs, MAX_SURFACES, MOST_PROBES, Observation, Parameter, Piece, Probes,
+    Sides, Signals, StepStart, System, choose, enclosed, parameter, sides_of, surface_in_turn,
 };
 use crate::formula::{Expression, Kinks, Leaf, Mistake, Names, Op, Place, Program, StageWeights, StepFrom};
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
@@ -25,7 +25,6 @@ struct Law {
     /// The rates with comparisons in place of surfaces.
     written: Program,
     surfaces: Vec<Program>,
-    steady: SteadySurfaces,
     /// The components of the state that the surfaces depend on.
     watched: Vec<bool>,
     kinks: Kinks,
@@ -39,8 +38,7 @@ impl Law {
         let takes = |n: usize| kinks.surfaces.iter().any(|own| own.ops().contains(&Op::Push(Leaf::State(n))));
         let watched = (0..equations.len()).map(|n| slides || takes(n)).collect();
         let number = Number(LAWS.fetch_add(1, Ordering::Relaxed));
-        let steady = SteadySurfaces::of(&kinks);
-        Self { number, rates: Program::of(equations), written, surfaces, steady, watched, kinks }
+        Self { number, rates: Program::of(equations), written, surfaces, watched, kinks }
     }
 }
 
@@ -75,8 +73,8 @@ pub struct Own<S, const D: usize> {
     /// The part of the rates, and of each surface, that the parameters determine.
     fixed: Vec<S>,
     fixed_surfaces: Vec<Vec<S>>,
-    /// The same of all steady surfaces, for places side by side.
-    fixed_places: Vec<Places>,
+    /// The same for places side by side, if these have the values in turn.
+    fixed_places: Vec<Vec<Places>>,
     sliding: Vec<SlidingSurface<S>>,
     inputs: InputValues<S>,
 }
@@ -280,27 +278,24 @@ impl<S: Scalar, const D: usize> System<S, D> for Own<S, D> {
         inputs.side(t.lane(0), forwards)
     }
 
-    fn suspect(
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    ) {
+    ) -> [S::Real; MOST_PROBES] {
         let slides = |own: &SlidingSurface<S>| own.slides(&at.sides).any();
-        if self.fixed_places.is_empty() || self.sliding.iter().any(slides) {
-            return suspect_in_turn(self, at, wall, probes, found);
-        }
-        self.law.steady.suspect(&self.fixed_places, at, probes, &self.law.watched, found);
-        for (&steady, found) in self.law.kinks.steady.iter().zip(&mut *found) {
-            if !steady {
-                *found = S::mask(true);
+        if let Some(program) = self.law.surfaces.get(j)
+            && !self.sliding.iter().any(slides)
+        {
+            if let Some(n) = program.component() {
+                return probes.each(at.t, |_, x| x[n]);
+            }
+            if let Some(fixed) = self.fixed_places.get(j).filter(|fixed| !fixed.is_empty()) {
+                return surface_along::values((program, fixed), at, probes, &self.law.watched);
             }
         }
-        // The surfaces between sliding and not keep their negative values.
-        for own in &self.sliding {
-            found[own.mode] = at.sides[own.mode];
-        }
+        surface_in_turn(self, j, at, probes)
     }
 
     fn input(&self, k: usize, t: S::Real, sides: &Sides<S>) -> Piece<S> {
@@ -424,7 +419,7 @@ impl<const D: usize> FormulaFamily<D> {
             fixed: law.rates.fix(values),
             fixed_surfaces: law.surfaces.iter().map(|own| own.fix(values)).collect(),
             fixed_places: match inputs {
-                InputValues::None => law.steady.fix(values),
+                InputValues::None => law.surfaces.iter().map(|own| surface_along::fix(own, values)).collect(),
                 _ => Vec::new(),
             },
             sliding: sliding_surfaces(&law, D, values),

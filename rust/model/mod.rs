@@ -16,8 +16,8 @@ mod lugre;
 mod observation;
 mod pendulum;
 mod sliding_mode;
-mod steady_surfaces;
 pub mod stick_slip;
+mod surface_along;
 mod targets;
 
 pub use any::AnySystem;
@@ -31,7 +31,7 @@ pub use lugre::WithLuGre;
 pub use observation::Observation;
 pub use pendulum::{Pendulum, PendulumFamily};
 pub use stick_slip::Sticking;
-pub use targets::{MOST_PROBES, Probes, StepStart, TARGETS, Targets, WALL, suspect, suspect_in_turn};
+pub use targets::{MOST_PROBES, Probes, StepStart, TARGETS, Targets, WALL, surface_in_turn, suspects};
 
 use crate::formula::StageWeights;
 use crate::scalar::{Enclosed, Mask, Real, Scalar};
@@ -132,17 +132,15 @@ pub trait System<S: Scalar, const D: usize>: Sync {
         Piece { origin: S::zero(), coefficients: [0.0; PIECE_COEFFICIENTS] }
     }
 
-    /// Looks on which side of every surface, and of the wall, a step's places are; see [`suspect`].
-    fn suspect(
+    /// The function of surface `j` at these places of a step, on the sides of the step's start.
+    #[inline(always)]
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    ) where
-        Self: Sized,
-    {
-        suspect(self, at, wall, probes, found);
+    ) -> [S::Real; MOST_PROBES] {
+        surface_in_turn(self, j, at, probes)
     }
 }
 
@@ -215,14 +213,13 @@ impl<S: Scalar, const D: usize, M: System<S, D>> System<S, D> for &M {
         (**self).input(k, t, sides)
     }
     #[inline(always)]
-    fn suspect(
+    fn surface_along(
         &self,
+        j: usize,
         at: &StepStart<S, D>,
-        wall: bool,
         probes: &Probes<'_, S::Real, D>,
-        found: &mut [S::Mask; TARGETS],
-    ) {
-        (**self).suspect(at, wall, probes, found);
+    ) -> [S::Real; MOST_PROBES] {
+        (**self).surface_along(j, at, probes)
     }
 }
 

@@ -32,6 +32,18 @@ pub struct Probes<'a, R: Real, const D: usize> {
     pub states: &'a [[R; D]; MOST_PROBES],
 }
 
+impl<R: Real, const D: usize> Probes<'_, R, D> {
+    /// The values of a function of time and state.
+    #[inline(always)]
+    pub fn each(&self, start: R, value: impl Fn(R, &[R; D]) -> R) -> [R; MOST_PROBES] {
+        let mut values = [R::zero(); MOST_PROBES];
+        for (i, &part) in self.parts.iter().enumerate() {
+            values[i] = value(start + self.h.scale(part), &self.states[i]);
+        }
+        values
+    }
+}
+
 /// The functions of all targets on the sides of a step's start.
 pub struct Targets<'a, M, S: Scalar, const D: usize> {
     pub system: &'a M,
@@ -69,27 +81,29 @@ where
     /// The lanes that may cross each target, by so many places.
     #[inline(always)]
     fn at_places(&self, places: usize, probes: &Probes<'_, S::Real, D>, suspect: &mut [S::Mask; TARGETS]) {
+        let probes = &Probes { parts: &probes.parts[..places], ..*probes };
         // Unrolled, so that each target's function is known.
         unroll!(target in 0..TARGETS => {
             if self.has(target) {
-                suspect[target] = self.at_target(target, places, probes);
+                suspect[target] = match self.is_steady(target) {
+                    true => crossing(&self.along(target, probes), places),
+                    false => S::mask(true),
+                };
             }
         });
     }
 
-    /// The lanes that may cross a target, by so many places.
+    /// The target's function at these places, as [`value`](Self::value).
     #[inline(always)]
-    fn at_target(&self, target: usize, places: usize, probes: &Probes<'_, S::Real, D>) -> S::Mask {
-        if !self.is_steady(target) {
-            return S::mask(true);
+    pub fn along(&self, target: usize, probes: &Probes<'_, S::Real, D>) -> [S::Real; MOST_PROBES] {
+        if target == WALL {
+            return probes.each(self.at.t, |t, x| self.value(target, t, &vector!(S, D; n => S::lift(x[n]))));
         }
-        let parts = &probes.parts[..places];
-        let mut values = [S::Real::zero(); MOST_PROBES];
-        for i in 0..places {
-            let x = vector!(S, D; n => S::lift(probes.states[i][n]));
-            values[i] = self.value(target, self.at.t + probes.h.scale(parts[i]), &x);
+        let mut values = self.system.surface_along(target, self.at, probes);
+        for value in &mut values[..probes.parts.len()] {
+            *value = S::Real::select(self.at.sides[target], *value, -*value);
         }
-        crossing(&values, places)
+        values
     }
 }
 
@@ -127,10 +141,8 @@ pub fn crossing<R: Real>(values: &[R; MOST_PROBES], places: usize) -> R::Mask {
 /// Finds the lanes that may cross each target: those beyond it at any of these places, and those that the places leave in
 /// doubt. A function of its own for each law and kind of number, whatever the method.
 #[inline(never)]
-pub fn suspect<M: System<S, D>, S: Scalar, const D: usize>(
-    system: &M,
-    at: &StepStart<S, D>,
-    wall: bool,
+pub fn suspects<M: System<S, D>, S: Scalar, const D: usize>(
+    targets: &Targets<'_, M, S, D>,
     probes: &Probes<'_, S::Real, D>,
     suspect: &mut [S::Mask; TARGETS],
 ) {
@@ -138,7 +150,6 @@ pub fn suspect<M: System<S, D>, S: Scalar, const D: usize>(
     if const { M::SMOOTH } {
         return;
     }
-    let targets = Targets { system, at, wall };
     // The numbers of places, quarters or eighths, known to the compiler, which looks at them side by side.
     match probes.parts.len() {
         4 if const { size_of::<S>() == size_of::<f64>() } => targets.at_places(4, probes, suspect),
@@ -147,21 +158,15 @@ pub fn suspect<M: System<S, D>, S: Scalar, const D: usize>(
     }
 }
 
-/// The same, one target and one place after the other: for laws whose surfaces are long to ask for.
-pub fn suspect_in_turn<M: System<S, D>, S: Scalar, const D: usize>(
+/// The function of surface `j` at one place after the other.
+#[inline(always)]
+pub fn surface_in_turn<M: System<S, D> + ?Sized, S: Scalar, const D: usize>(
     system: &M,
+    j: usize,
     at: &StepStart<S, D>,
-    wall: bool,
     probes: &Probes<'_, S::Real, D>,
-    suspect: &mut [S::Mask; TARGETS],
-) {
-    if const { M::SMOOTH } {
-        return;
-    }
-    let targets = Targets { system, at, wall };
-    for (target, suspect) in suspect.iter_mut().enumerate() {
-        if targets.has(target) {
-            *suspect = targets.at_target(target, probes.parts.len(), probes);
-        }
-    }
+) -> [S::Real; MOST_PROBES] {
+    probes.each(at.t, |t, x| {
+        system.surface(j, S::lift(t), &vector!(S, D; n => S::lift(x[n])), &at.sides).real()
+    })
 }
