@@ -87,6 +87,16 @@ def test_steady_rotation_does_not_determine_the_contact(swing: float, determined
     assert (result is not None) == determined
 
 
+def test_a_fall_at_the_end_of_a_short_film_does_not_hide_the_contact() -> None:
+    """One window of three had the fall, and the common fit of all three determined no contact."""
+    t = np.arange(0, 3.6, 0.04)
+    centre, angle, _ = seen(t, 1)
+    centre[24:30], angle[24:30] = complex(np.nan, np.nan), np.nan
+    centre[-5:] += 4.9j * SCALE * (t[-5:] - t[-6]) ** 2
+    result = pivot(t, centre, angle, np.isfinite(angle), 57.0)
+    assert result is not None and abs(result.place) < 0.5  # pixels
+
+
 CLOCKS = [
     (),
     ((2.0, 8.0), (8.0, 1.0)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ Array = NDArray[np.float64]
 WINDOW = 1.5  # s; over longer stretches what the constraint leaves out (slip) adds up
 SHORTEST = 0.3  # s
 SLIPS = 6.0  # times the usual misfit; a window beyond shows something else
+STARTS = 20  # single windows that are tried
 # of the turning that the drive does not explain as well, root mean square; with less, as in steady rotation,
 # an error of a thousandth of the disk moves the contact by 3 %
 UNLIKE = 1 / 30
@@ -85,18 +87,25 @@ def pivot(
 def _rolling(
     rows: list[NDArray[np.complex128]], values: list[NDArray[np.complex128]]
 ) -> tuple[list[NDArray[np.complex128]], list[NDArray[np.complex128]]]:
-    """Return the windows in which the disk rolls as in most, without release and fall."""
+    """Return the windows in which the disk rolls as in most, without release and fall.
+
+    In a short film the window of the fall has a large share in a common fit, so single windows are tried too.
+    """
+
+    def misfits(part: Sequence[int]) -> Array:
+        design, value = np.concatenate([rows[k] for k in part]), np.concatenate([values[k] for k in part])
+        x = np.linalg.lstsq(design, value, rcond=None)[0]
+        return np.array([np.sqrt(np.mean(np.abs(v - d @ x) ** 2)) for d, v in zip(rows, values, strict=True)])
+
+    every = range(len(rows))
+    starts = [every, *([k] for k in every[:: len(rows) // STARTS + 1])]
+    off = min((misfits(part) for part in starts), key=lambda off: float(np.median(off)))
     for _ in range(3):
-        normal = sum((d.conj().T @ d for d in rows), np.zeros((2, 2), dtype=complex))
-        right = sum((d.conj().T @ v for d, v in zip(rows, values, strict=True)), np.zeros(2, dtype=complex))
-        x = np.linalg.lstsq(normal, right, rcond=None)[0]
-        off = np.array([np.sqrt(np.mean(np.abs(v - d @ x) ** 2)) for d, v in zip(rows, values, strict=True)])
-        keep = off <= SLIPS * np.median(off)
-        if keep.all() or keep.sum() < 2:
+        keep = np.flatnonzero(off <= SLIPS * np.median(off))
+        if len(keep) == len(rows):
             break
-        rows = [d for d, k in zip(rows, keep, strict=True) if k]
-        values = [v for v, k in zip(values, keep, strict=True) if k]
-    return rows, values
+        off = misfits(keep.tolist())
+    return [rows[k] for k in keep], [values[k] for k in keep]
 
 
 @dataclass(frozen=True)
