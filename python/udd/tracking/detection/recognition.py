@@ -77,7 +77,8 @@ def recognise(film: Film, look_over: Survey, options: TrackOptions) -> Recogniti
         )
     if missing is not None:
         warnings.warn(
-            f"{film.path}: no {COLOURS[missing]} mark is seen; the other three are used", stacklevel=outside()
+            f"{film.path}: no {COLOURS[missing]} mark is seen clearly; the other three are used",
+            stacklevel=outside(),
         )
     clear = _without(still, options, seen[0][0].y.shape)
     return Recognition(look_over, sights, seen, options, clear)
