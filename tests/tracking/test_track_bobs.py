@@ -142,6 +142,14 @@ def test_the_patch_of_the_bobs_size_near_its_last_place_is_the_bob() -> None:
     assert isinstance(seen, Blob) and abs(seen.centre - (61.5 + 81.5j)) < 1
     (why,) = bob.attempts(lambda _: picture([]), picture(shirt[:6]), expected)
     assert isinstance(why, str) and "too large" in why
+    assert [*bob.attempts(lambda _: picture([]), picture([]), expected)] == ["the bob is not seen"]
+
+
+@pytest.mark.parametrize("path", [np.linspace(0, 80, 60), 1j * np.linspace(0, 80, 60)])
+def test_a_straight_path_is_fitted_by_a_circle_through_all_points(path: np.ndarray) -> None:
+    """No three of its points have a circle; that was a ValueError."""
+    fitted = circle(100 + 50j + path)
+    assert np.isfinite([fitted.centre, fitted.radius]).all()
 
 
 def test_whole_turns_in_a_gap_are_in_doubt_only_over_the_top() -> None:

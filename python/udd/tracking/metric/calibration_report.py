@@ -21,6 +21,7 @@ from udd.tracking.passes.tracks import Tracks
 from udd.tracking.passes.wobble import Wobble
 from udd.video.reader import Film, TrackError
 
+from .doubts import NO_CONTACT
 from .pixels_to_metres import Camera
 
 CLOSE_ENOUGH = 6.0  # mm: error of a contact that the support alone shows
@@ -69,10 +70,7 @@ def camera_of(tracks: Tracks, state: TrackerState, size: Scale, options: TrackOp
         )
     guess = support(state.view)
     if guess is None:
-        raise TrackError(
-            "the motion does not determine the contact point (the disk hardly turns, turns steadily, or the "
-            "camera moves) and no support is seen: give pivot=(u, v) in pixels"
-        )
+        raise TrackError(f"{NO_CONTACT} and no support is seen: give pivot=(u, v) in pixels")
     return camera(complex(state.look.lens.plane(guess)), CLOSE_ENOUGH * 1e-3, "support")
 
 

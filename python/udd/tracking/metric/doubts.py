@@ -13,6 +13,12 @@ DRIVEN = 8.0  # standard errors by which a drive's direction is known
 SLOWEST = 0.004  # m/s: a slower drive has no direction worth a name
 ROLLED = 0.35  # rad from a quarter turn within which the orientation is clear
 
+#: Why a contact is not determined.
+NO_CONTACT = (
+    "the motion does not determine the contact point (the disk hardly turns, turns steadily, or the camera "
+    "moves)"
+)
+
 
 def quarter_turns(gravity: ApparentGravity | None, camera: Camera) -> int:
     """Quarter turns counter-clockwise that bring a film upright; 0 if it is, or if nothing shows it clearly.
@@ -53,8 +59,7 @@ def doubts(gravity: ApparentGravity | None, camera: Camera, fps: float, turns: i
     sentences = []
     if camera.pivot_from == "support":
         sentences.append(
-            "the motion does not determine the contact point (the disk hardly turns, turns steadily, or the "
-            f"camera moves); it is taken from the support, to about {1e3 * camera.pivot_sigma:.0f} mm: give "
+            f"{NO_CONTACT}; it is taken from the support, to about {1e3 * camera.pivot_sigma:.0f} mm: give "
             "pivot=(u, v) in pixels"
         )
         gravity = None  # its lever is the distance from the contact

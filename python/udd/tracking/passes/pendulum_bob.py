@@ -117,7 +117,7 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
         if expected is not None:
             fits.sort(key=lambda blob: abs(blob.centre - expected.pose.centre))
         self.areas.append(fits[0].area if fits else None)
-        yield fits[0] if fits else why[0] if why else UNSEEN
+        yield (fits or why or [UNSEEN])[0]
 
     def sample(self, seen: Blob, expected: Prediction | None, t: float) -> PoseSample:
         """Return the place of a result."""
@@ -131,21 +131,24 @@ class Bob(Target[Blob, tuple[float, str, Blob | None]]):
 def circle(points: NDArray[np.complex128]) -> Circle:
     """Fit a circle through points by least squares of the distances; outliers count less.
 
-    It starts from the circle through three points from which the others have the least median distance.
-    A start from all points let one patch, of a shirt in the bob's colour, move the centre by a fifth of the
-    radius.
+    It starts from the circle, through three points or by linear least squares of all, from which the others
+    have the least median distance. A start from all points alone let one patch, of a shirt in the bob's
+    colour, move the centre by a fifth of the radius.
     """
     from scipy.optimize import least_squares
 
+    middle = points.mean()
+    u, v = (points - middle).real, (points - middle).imag
+    a, b, _ = np.linalg.lstsq(np.column_stack([u, v, np.ones(len(u))]), u**2 + v**2, rcond=None)[0]
     first, second, third = points[np.random.default_rng(0).integers(len(points), size=(TRIPLES, 3))].T
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = (third - first) / (second - first)
         centres = first + (second - first) * (ratio - np.abs(ratio) ** 2) / (2j * ratio.imag)
-    centres = centres[np.isfinite(centres)]
+    # Points on a line have no circle through three of them.
+    centres = np.append(centres[np.isfinite(centres)], middle + complex(a, b) / 2)
     away = np.abs(points - centres[:, None])
     rests = away - np.median(away, axis=1)[:, None]
     best = int(np.argmin(np.median(np.abs(rests), axis=1)))
-    middle = points.mean()
     start = centres[best] - middle
     usual = points[~is_astray(rests[best], 0.0)] - middle
     u, v = usual.real, usual.imag
@@ -233,9 +236,9 @@ def _wandering(at: NDArray[np.complex128], path: Circle) -> float:
     direction = np.angle((at - path.centre) / (at.mean() - path.centre))
     x = direction / max(float(np.abs(direction).max()), 1e-9)
     rest = path.rest - np.polyval(np.polyfit(x, path.rest, BENDS), x)
-    scatter = 1.48 * float(np.median(np.abs(np.diff(path.rest, 4)))) / 70**0.5
+    noise = 1.48 * float(np.median(np.abs(np.diff(path.rest, 4)))) / 70**0.5
     off = 1.48 * float(np.median(np.abs(rest)))
-    return off if off > SCATTERS * scatter else 0.0
+    return off if off > SCATTERS * noise else 0.0
 
 
 def _check_hanging(film: Film, at: NDArray[np.complex128], path: Circle, off: float, unsure: bool) -> None:
