@@ -314,6 +314,8 @@ def meaning(effect: udd.effects.Effect) -> Truth:
     braking = "friction" if slot == "friction" or ("Omega" in text and slot == "torque") else slot
     coordinate = next((name for name in ("Omega", "theta", "Y", "Z", "R", "beta") if name in text), "t")
     coordinate = "|Omega|" if coordinate == "Omega" else coordinate
+    if "cos(theta) + length*Omega^2/g" in text:
+        return Truth(braking, "load", "load")
     values = effect.parameters
     if effect.name == "power_drag":
         return Truth(*_SPEED, "power", 1 + values["n"])

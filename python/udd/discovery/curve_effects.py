@@ -28,7 +28,7 @@ _SHORTEST = 0.2  # smallest share of a move; below it no move improves the fit
 _WORSE = 1.02  # factor in chi2 that a move may cost
 _SLOW = 0.01  # share of chi2; once it decreases by less the model error may be reduced
 _SOFT = 1e-3
-_STILL = 0.05  # nats that another move must bring
+_STILL = 0.5  # nats that another move must bring; fits around it end within a few nats
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,7 +57,7 @@ class CurveFit(OneLine):
 
 
 def curve_effect(curve: Curve, name: str = "curve") -> Effect:
-    """Make an effect from a curve, or from a surface.
+    """Make an effect from a curve.
 
     Parameters
     ----------
@@ -65,21 +65,10 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
     name : str
         Prefix of its parameters' names.
     """
-    spline, last = curve.splines[0], curve.splines[-1]
-    if len(curve.coordinates) == 2:
-        return effects.surface(
-            curve.slot.name,
-            (curve.coordinates[0].text, curve.coordinates[1].text),
-            (spline.low, last.low),
-            (spline.high, last.high),
-            curve.coefficients.reshape(spline.size, last.size),
-            periodic=last.periodic,
-            momentum=curve.slot.momentum,
-            name=name,
-        )
+    (spline,), (coordinate,) = curve.splines, curve.coordinates
     return effects.curve(
         curve.slot.name,
-        curve.coordinates[0].text,
+        coordinate.text,
         spline.low,
         spline.high,
         curve.coefficients,

@@ -70,23 +70,22 @@ class Proposals:
     def __init__(self, fit: Fit, scores: ScoreRound, clock: Clock) -> None:
         self.fit, self.scores, self.clock = fit, scores, clock
 
-    def effects(self) -> tuple[list[TrialFit], set[str]]:
-        """Fit effects of the library, one or two at once; also name those with which the model fits worse.
+    def effects(self) -> list[TrialFit]:
+        """Fit effects of the library, one or two at once.
 
         Curves over the coordinates that score about as well are located too, with their formulas.
         """
         passing = self.scores.passing()
         trials = self._singles(passing)
         trials += self._look_alikes(trials)
-        # With these effects the model error cannot even be reduced as far as without them, nor with a second
-        # effect.
+        # With `loose` effects the model error cannot even be reduced as far as without them, nor with a
+        # second effect.
         tight = [t for t in trials if t.fit.level >= self.fit.level]
         loose = {t.candidates[0].effect.name for t in trials} - {t.candidates[0].effect.name for t in tight}
         if trials:
             trials += self.curves(self._near_curves(), far_behind(tight))
-        if trials and (self.fit.model.profile.discovery.pairs or any(t.curve for t in trials)):
             trials += self._pairs(loose, tight)
-        return trials, loose
+        return trials
 
     def _near_curves(self) -> list[Curve]:
         """Return the most probable curves, over each coordinate that scores about as well as the best.
@@ -94,7 +93,7 @@ class Proposals:
         A score around a wrong model does not distinguish coordinates that turn together. The friction as a
         function of the speed is always included, because drags are its rivals.
         """
-        single = [c for c in most_probable_first(self.scores.curves) if len(c.coordinates) == 1]
+        single = most_probable_first(self.scores.curves)
         if not single:
             return []
         # If a library term scores far higher than every curve, no curve is its rival.
@@ -104,13 +103,13 @@ class Proposals:
         kinds = list(dict.fromkeys(c.key_without_momentum for c in likely))[:_COORDINATES]
         return [c for c in likely if c.key_without_momentum in kinds]
 
-    def only_together(self, loose: set[str]) -> tuple[list[TrialFit], int]:
-        """Fit pairs of effects that may pass only together, except `loose` ones; also count all pairs."""
+    def only_together(self) -> tuple[list[TrialFit], int]:
+        """Fit pairs of effects that may pass only together; also count all pairs."""
         best, number = self.scores.library.pairs(_TOGETHER)
         likely = [
             [s.candidate for s in group]
             for group, fall in best
-            if len({s.candidate.effect.name for s in group} - loose) == 2
+            if len({s.candidate.effect.name for s in group}) == 2
             and fall > self.scores.fit.film_error_chi2
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]

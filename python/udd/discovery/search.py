@@ -27,7 +27,7 @@ from udd.fitting import (
 from .acceptance import Acceptance, SearchState, Step
 from .proposals import Proposals
 from .results import RejectedEffect
-from .score_rounds import ScoreRound, most_probable_first, score_round, with_surfaces
+from .score_rounds import ScoreRound, most_probable_first, score_round
 from .thresholds import ALPHA, RejectionReason
 from .time_budget import TimeUpError
 from .trial_fits import fitted_ones, needed_in, of_library
@@ -94,18 +94,7 @@ class Search:
             self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
             rounds.append(scores)
-            # A curve that clearly beats every library term cannot be a biased view of one if the library was
-            # tried before or the effect is strong. For a machine it can, because its library has most terms
-            # of machines.
-            chaotic = states[-1].part.model.profile.discovery.chaotic
-            first = scores.curve_leads() and (accepted or scores.off_track or chaotic)
-            tried = scores.passing_curves() if first else []
-            addition = self._located(states[-1], scores) if tried else None
-            addition = addition or self._library_step(states[-1], scores)
-            if addition is None:
-                self.tell("scoring surfaces over two coordinates")
-                rounds[-1] = scores = with_surfaces(scores)
-                addition = self._located(states[-1], scores, tried)
+            addition = self._addition(states[-1], scores, with_more=bool(accepted))
             if addition is None:
                 break
             accepted.append(addition[0])
@@ -220,31 +209,38 @@ class Search:
         best = min(record_dependent, key=lambda pair: pair[0])[1]
         return [replace(best, why="records"), *(r for r in near_misses if r is not best)]
 
-    def _library_step(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
-        """Return the best passing addition from the library: one effect, or two together."""
-        proposals = Proposals(current.part, scores, self.clock)
-        trials, loose = proposals.effects()
-        if single := self.tests.best(current, trials, scores):
-            return single
-        together, number = proposals.only_together(loose)
-        return self.tests.best(current, together, replace(scores, comparisons=number))
-
-    def _located(
-        self, current: SearchState, scores: ScoreRound, tried: Sequence[Curve] = ()
+    def _addition(
+        self, current: SearchState, scores: ScoreRound, with_more: bool
     ) -> tuple[Step, SearchState] | None:
-        """Return the best passing curve or surface; those already chosen from `tried` are skipped."""
+        """Return the best passing addition: effects of the library, one or two, or a curve.
 
-        def best(curves: Sequence[Curve]) -> list[Curve]:
-            most = max((c.evidence for c in curves), default=0.0)
-            one_each: dict[tuple[str, ...], list[Curve]] = {}
-            for curve in most_probable_first([c for c in curves if c.evidence > _LIKELY * most]):
-                one_each.setdefault(curve.key_without_momentum, []).append(curve)
-            # A full fit decides between a velocity with its momentum and without.
-            groups = list(one_each.values())[:_CURVES]
-            return [*groups[0], *(curve for curve, *_others in groups[1:])] if groups else []
+        If no single effect of the library can be fitted, pairs that pass only together are tried, then
+        curves.
+        """
+        # A curve that clearly beats every library term cannot be a biased view of one if the library was
+        # tried before or the effect is strong. For a machine it can, because its library has most terms of
+        # machines.
+        chaotic = current.part.model.profile.discovery.chaotic
+        leads = scores.curve_leads() and (with_more or scores.off_track or chaotic)
+        if leads and (located := self._located(current, scores)):
+            return located
+        proposals = Proposals(current.part, scores, self.clock)
+        if trials := proposals.effects():
+            return self.tests.best(current, trials, scores)
+        together, number = proposals.only_together()
+        pair = self.tests.best(current, together, replace(scores, comparisons=number))
+        return pair or (None if leads else self._located(current, scores))
 
-        tried_names = [c.name for c in best(tried)]
-        likely = [c for c in best(scores.passing_curves()) if c.name not in tried_names]
+    def _located(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
+        """Return the best passing curve."""
+        curves = scores.passing_curves()
+        most = max((c.evidence for c in curves), default=0.0)
+        one_each: dict[tuple[str, ...], list[Curve]] = {}
+        for curve in most_probable_first([c for c in curves if c.evidence > _LIKELY * most]):
+            one_each.setdefault(curve.key_without_momentum, []).append(curve)
+        # A full fit decides between a velocity with its momentum and without.
+        groups = list(one_each.values())[:_CURVES]
+        likely = [*groups[0], *(curve for curve, *_others in groups[1:])] if groups else []
         trials = Proposals(current.part, scores, self.clock).curves(likely)
         return self.tests.best(current, trials, scores)
 

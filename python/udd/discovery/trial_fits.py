@@ -137,8 +137,7 @@ def with_more(
 def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | None:
     """Fit a curve in full; return None if that fails, or chi2 stays above `most`."""
     try:
-        kind = "curve" if len(curve.coordinates) == 1 else "surface"
-        located = fit_curve(current, curve, _unused(current, kind), most)
+        located = fit_curve(current, curve, _unused(current, "curve"), most)
     except FitError:
         return None
     if not located.fit.converged:

@@ -377,7 +377,6 @@ Disk.profile = ModelProfile(
         horizons=(0.2, 0.4, 1.0, 2.0, 4.0),
         filter_window=1.0,
         filter_level=1,
-        pairs=False,
         chaotic=True,
         coordinates=_coordinates,
         # The contact's velocities with and without the momentum that goes with them.

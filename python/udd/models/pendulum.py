@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from udd.errors import ModelError
 from .compiled import CompiledModel, plain_friction
 from .formula_model import FormulaModel
 from .profile import (
+    Coordinate,
     CurveSlot,
     DiscoveryProfile,
     DynamicsProfile,
@@ -267,6 +269,25 @@ def _pace(p: Parameters) -> float:
 
 # --- what to film next
 
+#: F/g - 1, where F is the rod's force on the pivot: the bob's weight and its centrifugal force.
+_LOAD = "(cos(theta) + length*Omega^2/g - 1)"
+
+
+def _load(model: Pendulum, _t: Floats, x: Floats) -> Floats:
+    result: Floats = np.cos(x[..., 1]) + model.length * x[..., 0] ** 2 / model.g - 1.0
+    return result
+
+
+def _loading(model: Pendulum, x: Floats, v: Floats) -> Floats:
+    result: Floats = 2 * model.length * x[..., 0] * v[..., 0] / model.g - np.sin(x[..., 1]) * v[..., 1]
+    return result
+
+
+def _coordinates(model: Pendulum) -> tuple[Coordinate, ...]:
+    load = Coordinate("load", partial(_load, model), partial(_loading, model), False, _LOAD)
+    return (load,) if model.g else ()
+
+
 _SWINGS = (0.5, 1.5, 2.0)  # times the present start
 _UPRIGHT = 2.8  # rad; a pendulum is not started farther out
 
@@ -325,6 +346,7 @@ Pendulum.profile = ModelProfile(
         filter_level=3,
         brakes=("k0",),
         slots=(CurveSlot("torque", None, "Omega"), CurveSlot("friction", None, "Omega")),
+        coordinates=_coordinates,
         films=_films,
     ),
     shown=ShownProfile(

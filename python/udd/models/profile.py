@@ -292,8 +292,6 @@ class DiscoveryProfile:
         Length of the data before each run from which its state is filtered [s].
     filter_level : int
         The model error of that filter, as an index into its levels.
-    pairs : bool
-        True if a search also tries two effects at once after one passes; otherwise only with formulas.
     chaotic : bool
         True if a wrong model with a small model error diverges within seconds, so that scores around it
         select the wrong effect. A motion that decays over minutes shows effects only around such a fit.
@@ -311,7 +309,6 @@ class DiscoveryProfile:
     horizons: tuple[float, ...] = (0.2, 0.4, 1.0, 2.0, 4.0)
     filter_window: float = 1.0
     filter_level: int = 2
-    pairs: bool = True
     chaotic: bool = False
     brakes: tuple[str, ...] = ()
     coordinates: Callable[[Any], tuple[Coordinate, ...]] = no_coordinates

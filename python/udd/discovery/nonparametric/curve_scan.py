@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,20 +14,19 @@ from udd._util.parallel import parallel_map
 from udd.discovery.scoring.coordinates import Slot, coordinates, slots
 from udd.discovery.scoring.forcing import Responses, Score, responses, score_forcings
 from udd.fitting import Fit
-from udd.models import Model
 from udd.models.profile import Coordinate
 
-from .bsplines import Spline, along, product, rough_product
+from .bsplines import Spline, along
 from .penalized_curves import Confounding, chance, smooth
 
 Array = NDArray[np.float64]
 
 #: Difference in log evidence (nats) below which explanations are not distinguished.
 EVIDENCE_MARGIN = 10.0
-#: Intervals between knots along one coordinate, and along each of two.
-INTERVALS, INTERVALS_OF_TWO = 14, 3
+#: Intervals between knots along a coordinate.
+INTERVALS = 14
 #: The same along a periodic angle: it resolves five waves per turn.
-ROUND, ROUND_OF_TWO = 24, 6
+ROUND = 24
 _FINER = 2  # factor in the number of knots for the curve that is kept
 _FEW = 6  # best curves, which are also tried with the momentum that goes with them
 
@@ -116,8 +114,8 @@ class Curve(OneLine):
 
     def design(self, *x: Array) -> Array:
         """Evaluate the basis functions at places, (..., k)."""
-        designs = [s.design(np.asarray(v, dtype=np.float64)) for s, v in zip(self.splines, x, strict=True)]
-        return designs[0] if len(designs) == 1 else product(*designs)
+        ((spline, values),) = zip(self.splines, x, strict=True)
+        return spline.design(np.asarray(values, dtype=np.float64))
 
     def values(self, *x: Array) -> Array:
         """Evaluate the curve at places, in the slot's unit."""
@@ -145,7 +143,7 @@ class Curve(OneLine):
     @property
     def roughness(self) -> Array:
         """Matrix of the smoothness prior."""
-        return _roughness(self.splines)
+        return self.splines[0].roughness
 
 
 @dataclass(frozen=True)
@@ -166,7 +164,6 @@ class CurveScan:
 def scan_curves(
     fit: Fit,
     *,
-    pairs: bool = False,
     only: Callable[[Slot, tuple[Coordinate, ...]], bool] | None = None,
 ) -> CurveScan:
     """Score a smooth curve in every equation as a function of every coordinate.
@@ -178,8 +175,6 @@ def scan_curves(
     Parameters
     ----------
     fit : Fit
-    pairs : bool
-        True to include surfaces over two coordinates.
     only : callable, optional
         ``(slot, coordinates) -> bool``: filter of the curves to try.
 
@@ -207,7 +202,7 @@ def scan_curves(
     groups = [
         (slot, coords)
         for slot in slots(fit.model)
-        for coords in _choices(fit.model, pairs)
+        for coords in ((c,) for c in coordinates(fit.model))
         if _sensible(slot, coords) and (only is None or only(slot, coords))
     ]
     # A velocity of the contact scores nearly the same with and without its momentum: only if the first is
@@ -260,12 +255,12 @@ def score_splines(
 def refined(curve: Curve, fit: Fit) -> Curve:
     """Refit the curve on finer knots, so that only the smoothness prior limits its curvature.
 
-    It covers the range of the fit's data. A surface keeps its knots.
+    It covers the range of the fit's data.
     """
     moved = responses(fit)
-    finer = _splines(moved, curve.coordinates)
-    if len(finer) == 1:
-        finer = (replace(finer[0], intervals=_FINER * finer[0].intervals),)
+    finer = tuple(
+        replace(spline, intervals=_FINER * spline.intervals) for spline in _splines(moved, curve.coordinates)
+    )
     (score,) = score_splines(moved, [curve.slot], curve.coordinates, finer)
     return _curve(moved, curve.slot, curve.coordinates, finer, score)
 
@@ -288,31 +283,16 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     )
 
 
-def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:
-    """Yield the coordinates, and pairs of independent ones."""
-    single = coordinates(model)
-    yield from ((c,) for c in single)
-    if not pairs:
-        return
-    made_of = {"|Omega|": {"Omega"}, "R": {"Y", "Z"}, "theta": {"Y", "Z"}, "load": {"Omega", "Y", "Z"}}
-    for a, b in itertools.combinations((c for c in single if c.name != "t"), 2):
-        parts = [made_of.get(c.name, {c.name}) for c in (a, b)]
-        if not parts[0] & parts[1]:
-            # A periodic coordinate comes last: a surface can be periodic along its second coordinate.
-            yield (b, a) if a.angle else (a, b)
-
-
 def _sensible(slot: Slot, coords: tuple[Coordinate, ...]) -> bool:
     """Return False for a curve equivalent to another: friction over Omega is a torque over it."""
     return not (slot.name == "friction" and any(c.name == "Omega" for c in coords))
 
 
 def _splines(moved: Responses, coords: tuple[Coordinate, ...]) -> tuple[Spline, ...]:
-    straight, round_ = (INTERVALS, ROUND) if len(coords) == 1 else (INTERVALS_OF_TWO, ROUND_OF_TWO)
     result = []
     for c in coords:
-        spline = along(moved.along(c)[moved.linked], c.angle, round_)
-        result.append(spline if spline.periodic else replace(spline, intervals=straight))
+        spline = along(moved.along(c)[moved.linked], c.angle, ROUND)
+        result.append(spline if spline.periodic else replace(spline, intervals=INTERVALS))
     return tuple(result)
 
 
@@ -320,12 +300,9 @@ def _designs(
     moved: Responses, coords: tuple[Coordinate, ...], splines: tuple[Spline, ...]
 ) -> tuple[Array, Array]:
     """Evaluate the basis functions at the places of every link, and their rates of change."""
-    x = [moved.along(c) for c in coords]
-    values = [s.design(v) for s, v in zip(splines, x, strict=True)]
-    changes = [s.design(v, 1) * moved.speed(c)[..., None] for s, v, c in zip(splines, x, coords, strict=True)]
-    if len(coords) == 1:
-        return values[0], changes[0]
-    return product(*values), product(changes[0], values[1]) + product(values[0], changes[1])
+    ((spline, c),) = zip(splines, coords, strict=True)
+    x = moved.along(c)
+    return spline.design(x), spline.design(x, 1) * moved.speed(c)[..., None]
 
 
 def _curve(
@@ -335,7 +312,7 @@ def _curve(
     splines: tuple[Spline, ...],
     score: Score,
 ) -> Curve:
-    roughness = _roughness(splines)
+    roughness = splines[0].roughness
     smoothed = smooth(score, roughness, moved.fit.observations)
     p, fall, number = chance(score, roughness)
     return Curve(
@@ -353,7 +330,3 @@ def _curve(
         tuple(moved.along(c)[moved.linked, 0] for c in coords),
         score,
     )
-
-
-def _roughness(splines: tuple[Spline, ...]) -> Array:
-    return splines[0].roughness if len(splines) == 1 else rough_product(*splines)

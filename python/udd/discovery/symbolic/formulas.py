@@ -102,11 +102,8 @@ def formulas_for(
     Returns
     -------
     list of Formula
-        The most probable first, without those that are less probable by `EVIDENCE_MARGIN`. Empty for a
-        surface.
+        The most probable first, without those that are less probable by `EVIDENCE_MARGIN`.
     """
-    if len(curve.coordinates) != 1:
-        return []
     target = _Target(curve, observations)
     regressed = regression(curve, _MOST_CONSTANTS, seed)
     trials = []
