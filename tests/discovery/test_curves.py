@@ -95,6 +95,10 @@ def test_the_load_is_the_same_in_formulas_and_for_each_film():
         (friction,) = (s for s in slots(plain) if s.title == "friction")
         made = friction.forcing(plain, x, 1e-3 * item.of(np.zeros(20), x), np.zeros(20))
         np.testing.assert_allclose(plain.with_effects([effect]).rates(0.0, x) - rates, made, atol=1e-9)
+        # The text may be the base of a power.
+        squared = plain.with_effects([E.formula("friction", f"a * {item.text}^2", a=1e-3)])
+        made = friction.forcing(plain, x, 1e-3 * item.of(np.zeros(20), x) ** 2, np.zeros(20))
+        np.testing.assert_allclose(squared.rates(0.0, x) - rates, made, atol=1e-9)
 
 
 def test_films_at_two_drives_have_their_own_loads():
@@ -421,6 +425,7 @@ def test_formulas_are_read_by_a_whitelist():
     node, values = read("sqrt(X1) + 2*3*X1^-2 + X1^0.5", {"X1": ("x",)})
     assert values == [0.5, 6.0, 0.5]
     assert write(node, "x", dict(enumerate("abc"))) == "x^a + b * x^(-2) + x^c"
+    assert write(simplify(*read("(X1^2)^2", {"X1": ("x",)})), "R", {}) == "R^4"
     for bad in (
         "__import__('os')",
         "X1.real",

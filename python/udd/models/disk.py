@@ -264,7 +264,7 @@ def _azimuthal(x: Floats, v: Floats) -> Floats:
 
 
 #: F/g - 1, where F = g + d^2Z/dT^2 is the contact's force along the drive, by the plain model.
-_LOAD = "-(Z*Omega^2 + Y*(g*Y - k*Omega - W*Z*Omega)/inertia)/g"
+_LOAD = "(-(Z*Omega^2 + Y*(g*Y - k*Omega - W*Z*Omega)/inertia)/g)"
 
 
 def _load(plain: Disk, _t: Floats, x: Floats) -> Floats:

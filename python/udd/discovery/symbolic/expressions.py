@@ -233,6 +233,8 @@ def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
         return ("n", 1.0)
     if kind == "/" and _is(a, 0.0):
         return ("n", 0.0)
+    if kind == a[0] == "^" and all(part[0] == "n" and float(part[1]).is_integer() for part in (a[2], b)):
+        return ("^", a[1], ("n", a[2][1] * b[1]))
     number = ("n", "c")
     if kind in "+*" and b[0] in number:
         a, b = b, a  # numbers come first
