@@ -62,10 +62,12 @@ def odd_frames(t: Array, guess: Array, sigma: Array, linked: Flags) -> Flags:
     return _odd_singles(t, guess, sigma, linked, odd)
 
 
-def between(odd: Flags, x: Array) -> Array:
-    """Interpolate the outliers of a channel from the other frames."""
-    number = np.arange(len(x), dtype=np.float64)
-    return akima(number[odd], number[~odd], x[~odd])
+def interpolated(x: Array, odd: Flags) -> Array:
+    """Replace the outliers of each channel (n, m) by interpolation over the other frames."""
+    number, result = np.arange(len(x), dtype=np.float64), x.copy()
+    for channel in result.T:
+        channel[odd] = akima(number[odd], number[~odd], channel[~odd])
+    return result
 
 
 def akima(at: Array, there: Array, column: Array) -> Array:
@@ -112,8 +114,8 @@ class _Steps(NamedTuple):
     speed : ndarray (n - 1, m)
         Mean speed from each frame to the next.
     dt : ndarray (n - 1, 1)
-    sigma : ndarray (m,)
-        Noise of the channels.
+    noise : ndarray (m,)
+        Noise of a difference between frames.
     """
 
     t: Array
@@ -121,7 +123,7 @@ class _Steps(NamedTuple):
     run: NDArray[np.int64]
     speed: Array
     dt: Array
-    sigma: Array
+    noise: Array
 
     def ranges(self, width: int, first: NDArray[np.int64], last: NDArray[np.int64]) -> tuple[Array, Array]:
         """Return the least and largest speed in so many steps before and after each of these frames.
@@ -129,21 +131,16 @@ class _Steps(NamedTuple):
         The shapes are (k, m, 2). The speeds are NaN near the ends of a run, where fewer than `_LEAST` of
         these steps exist.
         """
-        inside = (np.diff(self.run) == 0)[:, None]
-        pad, window = ((width, width), (0, 0)), (width, 0)
-        low, high = (
-            np.pad(np.where(inside, self.speed, fill), pad, constant_values=fill)
-            for fill in (np.inf, -np.inf)
-        )
-        count = sliding_window_view(np.pad(inside, pad), *window)
-        low, high = sliding_window_view(low, *window), sliding_window_view(high, *window)
+        inside = np.where((np.diff(self.run) == 0)[:, None], self.speed, np.nan)
+        padded = np.pad(inside, ((width, width), (0, 0)), constant_values=np.nan)
+        windows = sliding_window_view(padded, width, axis=0)
 
-        def extremes(at: NDArray[np.int64]) -> Array:
-            result = np.stack([low[at].min(axis=-1), high[at].max(axis=-1)], axis=-1)
-            result[count[at].sum(axis=-1)[:, 0] < _LEAST] = np.nan
+        def extremes(speeds: Array) -> Array:
+            result = np.stack([np.fmin.reduce(speeds, axis=-1), np.fmax.reduce(speeds, axis=-1)], axis=-1)
+            result[(~np.isnan(speeds)).sum(axis=-1) < _LEAST] = np.nan
             return result
 
-        return extremes(first), extremes(width + last)
+        return extremes(windows[first]), extremes(windows[width + last])
 
     def jumps(self, numbers: NDArray[np.int64], ranges: Array) -> Flags:
         """Return True for each of these steps and each channel if its speed is far outside a range."""
@@ -164,12 +161,6 @@ class _Steps(NamedTuple):
         speed = (self.x[last] - self.x[first]) / time
         excess = np.maximum(speed - high, low - speed)
         result: Flags = excess <= share * (high - low) + _NOISE * self.noise / time
-        return result
-
-    @property
-    def noise(self) -> Array:
-        """Noise of a difference between frames, (m,)."""
-        result: Array = np.sqrt(2.0) * self.sigma
         return result
 
 
@@ -231,7 +222,7 @@ def _blocks(t: Array, x: Array, sigma: Array, run: NDArray[np.int64]) -> list[_B
     if len(t) < 2 * _LEAST + 3:
         return []
     dt = _durations(t)
-    steps = _Steps(t, x, run, np.diff(x, axis=0) / dt, dt, sigma)
+    steps = _Steps(t, x, run, np.diff(x, axis=0) / dt, dt, np.sqrt(2.0) * sigma)
     numbers = np.arange(len(dt))
     before, _after = steps.ranges(_AROUND, numbers, numbers)
     starts = np.flatnonzero(steps.jumps(numbers, before).any(axis=1)) + 1
@@ -303,15 +294,12 @@ def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags
     inside &= ~maximum_filter1d(block, 5)
     if not inside.any():
         return odd
-    filled = guess.copy()
-    for channel in filled.T:
-        channel[odd] = between(odd, channel)
     weights, noisier = _cubic(t)
     rounding = 8 * np.finfo(np.float64).eps * np.abs(guess).max(axis=0)
     dt = np.diff(t)[:, None]
     longest = np.maximum(dt[1:-2], dt[2:-1])
     for _ in range(_CLEANED):
-        off = np.zeros_like(guess)
+        off, filled = np.zeros_like(guess), interpolated(guess, odd)
         around = (filled[:-4], filled[1:-3], filled[3:-1], filled[4:])
         cubic = sum(w[:, None] * x for w, x in zip(weights, around, strict=True))
         off[2:-2] = np.abs(filled[2:-2] - cubic) / noisier[:, None]
@@ -337,8 +325,6 @@ def _odd_singles(t: Array, guess: Array, sigma: Array, linked: Flags, odd: Flags
         if not is_odd.any():
             break
         odd |= is_odd
-        for channel in filled.T:
-            channel[odd] = between(odd, channel)
     return odd
 
 
@@ -348,13 +334,10 @@ def _cubic(t: Array) -> tuple[list[Array], Array]:
     The noise of the distance from the cubic is relative to that of even stamps, and at least 1.
     """
     at, around = t[2:-2], (t[:-4], t[1:-3], t[3:-1], t[4:])
-    weights = []
-    for place in around:
-        weight = np.ones(len(at))
-        for other in around:
-            if other is not place:
-                weight *= (at - other) / (place - other)
-        weights.append(weight)
+    weights = [
+        np.prod([(at - other) / (place - other) for other in around if other is not place], axis=0)
+        for place in around
+    ]
     even = np.sqrt(35.0 / 18.0)
     return weights, np.maximum(np.sqrt(1.0 + sum(w**2 for w in weights)) / even, 1.0)
 
