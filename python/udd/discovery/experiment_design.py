@@ -220,9 +220,7 @@ class _Pair:
         name = self.chosen.effect.name
         order = list(self._without(self.fit.models[0]).parameters)
         kept = (f for f in self.fit.problem.free if not f.name.startswith(f"{name}."))
-        return tuple(
-            replace(f, index=order.index(f.name.split("[")[0])) if f.role == "model" else f for f in kept
-        )
+        return tuple(replace(f, index=order.index(f.base)) if f.role == "model" else f for f in kept)
 
     def _without(self, model: Model) -> Model:
         return model.with_effects([e for e in model.effects if e.name != self.chosen.effect.name])
@@ -312,7 +310,7 @@ def _for_films(free: Sequence[Free], models: Sequence[Model], further: Model) ->
     first = [f for f in free if f.film == 0]
     added = []
     for f in first:
-        name = f.name.split("[")[0]
+        name = f.base
         other = replace(f, film=len(models), name=f"{name}[{len(models)}]")
         if f.role == "model" and models[0].parameters[name]:
             times = further.parameters[name] / models[0].parameters[name]

@@ -39,6 +39,11 @@ class Free:
     sd: float
     film: int | None = None
 
+    @property
+    def base(self) -> str:
+        """Name without the number of the film."""
+        return self.name.partition("[")[0]
+
 
 def free_parameters(
     models: Sequence[Model],
@@ -160,10 +165,10 @@ def _with_priors(free: list[Free], given: dict[str, tuple[float, float]]) -> tup
             raise FitError(
                 f"the prior of {name} needs a finite mean and a positive standard deviation, not {mean}, {sd}"
             )
-    unknown = set(given) - {f.name for f in free} - {f.name.split("[")[0] for f in free}
+    unknown = set(given) - {f.name for f in free} - {f.base for f in free}
     if unknown:
         raise FitError(
             f"priors has {', '.join(sorted(unknown))}, which is not free; add it to free or drop it"
         )
-    chosen = (given.get(f.name, given.get(f.name.split("[")[0], (f.mean, f.sd))) for f in free)
+    chosen = (given.get(f.name, given.get(f.base, (f.mean, f.sd))) for f in free)
     return tuple(replace(f, mean=mean, sd=sd) for f, (mean, sd) in zip(free, chosen, strict=True))

@@ -105,9 +105,9 @@ def input_bias(fit: Fit, draws: int = 6, rng: int | np.random.Generator | None =
     if not fit.model.inputs:
         raise FitError("the model has no inputs, so there is no bias by their noise")
     draws, random = whole("draws", draws, _FEWEST), generator(rng)
-    names = list(dict.fromkeys(free.name.partition("[")[0] for free in fit.problem.free))
+    names = list(dict.fromkeys(f.base for f in fit.problem.free))
     priors = {free.name: (free.mean, free.sd) for free in fit.problem.free if np.isfinite(free.sd)}
-    each = list(dict.fromkeys(f.name.partition("[")[0] for f in fit.problem.free if f.film is not None))
+    each = list(dict.fromkeys(f.base for f in fit.problem.free if f.film is not None))
     firsts = [int(np.argmax(fit.record.film == film)) for film in range(len(fit.measurements))]
     starts = [dict(zip(fit.model.state_names, fit.states[k].tolist(), strict=True)) for k in firsts]
     draws_by_size: list[list[list[float]]] = [[] for _ in _TIMES]

@@ -161,7 +161,7 @@ def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -
     """
     k = number("k", k, above=0.0)
     free = fit.problem.free
-    free_names = {f.name.partition("[")[0] for f in free}
+    free_names = {f.base for f in free}
     if fixed is None:
         fixed = {name: sd for name, sd in fit.model.profile.fit.fixed.items() if name not in free_names}
     fixed = {name: number(name, value, above=0.0) for name, value in fixed.items()}
