@@ -11,7 +11,7 @@ import udd
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.validation.held_camera import camera_shows
 from udd.fitting import extend, fit_record, most_probable, record_of, refit
-from udd.fitting.formula_models import typical_noise
+from udd.fitting.sensor import roughness
 
 
 def filmed(
@@ -79,8 +79,8 @@ def test_a_signal_of_few_samples_a_turn_is_no_noise() -> None:
     """Third differences of nine samples a turn are a thirtieth of the signal, sixth ones a 500th."""
     t = np.arange(0, 1, 1 / 610)
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
-    result = typical_noise((np.sin(2 * np.pi * 70 * t) + noise)[:, None])
-    assert 0.8e-3 < result[0] < 4e-3  # 37e-3 by third differences alone
+    result = roughness(np.sin(2 * np.pi * 70 * t) + noise)
+    assert 0.8e-3 < result < 4e-3  # 37e-3 by third differences alone
 
 
 def test_a_formula_found_with_a_films_camera_held_is_not_identified() -> None:

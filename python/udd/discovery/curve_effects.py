@@ -176,7 +176,7 @@ def _solved(
     fit: Fit, curve: Curve, name: str, start: Fit, level: int, steps: int = FEW, decrease: float = ROUGH
 ) -> Fit:
     """Fit the model with the curve fixed, at a level of model error, from the end of another fit."""
-    problem, point = widened(fit, [curve_effect(curve, name)], start)
+    problem, point = widened(replace(fit, point=start.point), [curve_effect(curve, name)])
     problem = problem.with_model_error(problem.schedule[level])
     return minimise(problem, point, steps, decrease)
 

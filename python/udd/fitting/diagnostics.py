@@ -63,19 +63,17 @@ class RunawayParameter:
     value: float
     stated: float
     sd: float
-    error: float | None = None
+    error: float
 
     @property
     def text(self) -> str:
         """The warning, in one sentence."""
         unit = f" {self.unit}" if self.unit else ""
-        error = "" if self.error is None else f" ± {self.error:.2g}"
+        text = f"{self.name} = {self.value:.4g} ± {self.error:.2g}{unit}; expected"
         if not np.isfinite(self.sd):
-            return f"{self.name} = {self.value:.4g}{error}{unit}; expected a positive value"
-        return (
-            f"{self.name} = {self.value:.4g}{error}{unit}; expected {self.stated:.4g} ± {self.sd:.2g}{unit}: "
-            f"{abs(self.value - self.stated) / self.sd:.1f} standard deviations off"
-        )
+            return f"{text} a positive value"
+        off = abs(self.value - self.stated) / self.sd
+        return f"{text} {self.stated:.4g} ± {self.sd:.2g}{unit}: {off:.1f} standard deviations off"
 
 
 @dataclass(frozen=True, repr=False)
@@ -374,7 +372,7 @@ def ran_off(fit: Fit) -> list[RunawayParameter]:
     result, unit_of = [], units(fit)
     for free in fit.problem.free:
         value, error = fit.parameters[free.name], fit.errors[free.name]
-        is_friction = free.role == "model" and free.name.partition("[")[0] in ("k0", "k1")
+        is_friction = free.role == "model" and free.base in ("k0", "k1")
         if np.isfinite(free.sd) and abs(value - free.mean) > _OFF * free.sd:
             sd = free.sd
         elif is_friction and value < -_OFF * error:

@@ -13,7 +13,6 @@ from udd.measurement import Measurement
 from udd.models.formula_model import FormulaModel
 
 from .observation_inverse import inverted
-from .sensor import NO_NOISE, roughness
 
 Array = NDArray[np.float64]
 
@@ -165,12 +164,6 @@ def checked_start(model: FormulaModel | None, state0: object) -> dict[str, float
         ):
             raise FitError(f"the start value of {name} must be a finite number, not {value!r}")
         result[str(name)] = float(value)
-    return result
-
-
-def typical_noise(values: Array) -> Array:
-    """Estimate a measurement's noise from its roughness, if it does not state one."""
-    result: Array = np.maximum(roughness(values), 1e-6 * np.ptp(values, axis=0) + NO_NOISE)
     return result
 
 

@@ -67,9 +67,7 @@ class Noise(OneLine):
 
     def information(self, record: Record, omega: Array) -> Array:
         """Return the inverse covariance of every frame, (n, m, m), weighted; zero if not observed."""
-        sd = self.sd(record, omega)
-        seen = np.isfinite(sd)
-        scale = np.where(seen, 1.0 / np.where(seen, sd, 1.0), 0.0)
+        scale = 1.0 / self.sd(record, omega)
         result: Array = self.weight[:, None, None] * record.unmixing * scale[:, :, None] * scale[:, None, :]
         return result
 
@@ -149,7 +147,7 @@ def noise_autocorrelation(fit: Fit) -> Array:
 
 def _distance(record: Record, misfit: Array, sd: Array) -> Array:
     """Return the distance of each frame in standard deviations."""
-    normal = np.where(np.isfinite(sd), misfit / np.where(np.isfinite(sd), sd, 1.0), 0.0)
+    normal = np.nan_to_num(misfit / sd)
     squared = np.einsum("ni,nij,nj->n", normal, record.unmixing, normal)
     result: Array = np.sqrt(np.maximum(squared, 0.0))
     return result

@@ -16,7 +16,7 @@ from .estimator_input import FilmParameters
 from .fit_result import Fit, minimise
 from .minimum import MOST
 from .model_error_schedule import FEW, LEAP, ROUGH, provisional_fit, solve
-from .noise import estimated
+from .noise import estimated, stated
 from .problem import FOLLOWS, Point, Problem
 from .sensor import is_encoder
 
@@ -33,15 +33,15 @@ Misfits = Literal["noise", "little", "faults"]
 
 
 def solve_with_noise(problem: Problem, point: Point) -> Fit:
-    """Solve the problem while the model error is reduced step by step.
+    """Solve the problem while the model error is reduced step by step, and the noise is estimated anew.
 
     The noise is estimated at the largest model error at which the misfits show it, because a wrong model does
     least harm there. It is estimated again at the last level, if the model reaches it. At still larger model
     errors the states follow every frame, and noise and model error cannot be distinguished.
     """
-    as_stated, first = problem.noise, point
+    as_stated, first = replace(problem, noise=stated(problem.record)), point
     for number, diffusion in enumerate(problem.schedule):
-        problem = replace(problem, diffusion=diffusion, noise=as_stated)
+        problem = as_stated.with_model_error(diffusion)
         misfits, problem, point = _estimate_noise(problem, point)
         if misfits == "faults":
             break  # a smaller model error shows even more of them
@@ -56,7 +56,7 @@ def solve_with_noise(problem: Problem, point: Point) -> Fit:
             return solve(loose.problem, tighter, _afresh(loose), best=loose)
     # If the noise never shows, or is below the model's faults, the film is very precise: use its stated
     # noise.
-    return solve(replace(problem, noise=as_stated), problem.schedule, first)
+    return solve(as_stated, problem.schedule, first)
 
 
 def _likeliest_noise(fitted: Fit, tighter: Sequence[tuple[float, ...]]) -> Fit:

@@ -18,8 +18,8 @@ from udd.models import Model, profile_of
 from udd.models.formula_model import FormulaModel
 
 from .continuous import angles_of
-from .formula_models import checked_start, driven, guessed, slope, typical_noise
-from .outliers import akima, between, odd_frames
+from .formula_models import checked_start, driven, guessed, slope
+from .outliers import akima, interpolated, odd_frames
 from .sensor import (
     NO_NOISE,
     few_readings,
@@ -147,7 +147,7 @@ def record_of(
             raise FitError(f"got {number} but {len(given)} {what}; expected {expected}")
     alone = count == 1
     records = [_record_of(*arguments, alone) for arguments in zip(measurements, models, starts, strict=True)]
-    result = _joined(records if alone else _together(measurements, records))
+    result = _joined(_together(measurements, records))
     if (result.sigma <= NO_NOISE).any():
         frame, channel = np.argwhere(result.sigma <= NO_NOISE)[0]
         name = (models[0].channels if isinstance(models[0], FormulaModel) else measurements[0].names)[channel]
@@ -228,8 +228,6 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
     if seen.sum() < fewest:
         what = "a fit needs" if alone else "in a joint fit each measurement needs"
         raise FitError(f"the measurement holds {int(seen.sum())} usable frames; {what} at least {fewest}")
-    if alone and not (np.nanmax(values[seen], axis=0) > np.nanmin(values[seen], axis=0)).any():
-        raise FitError(f"{', '.join(measurement.names)}: all values are constant, so nothing can be fitted")
     origin = float(measurement.t[0])
     times = measurement.t[seen] - origin
     step = float(np.median(np.diff(times)))
@@ -259,8 +257,7 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
     guess = np.column_stack([_joined_up(t, t[there], column) for column in read.T])
     typical = np.array([np.median(column[np.isfinite(column)]) for column in sigma[:, places].T])
     odd = odd_frames(t, guess, typical, linked)
-    for channel in guess.T:
-        channel[odd] = between(odd, channel)
+    guess = interpolated(guess, odd)
     if odd[there].any() and stated is None:  # outliers do not show the noise, nor the range, of a column
         clean = np.where(present & odd[there, None], guess[there], read)
         sigma[np.ix_(there, places)] = np.where(present, _noise_of(measurement, clean), np.inf)
@@ -292,13 +289,10 @@ def _noise_of(measurement: Measurement, values: Array) -> Array:
     sensor = profile_of(measurement.kind).sensor
     if profile_of(measurement.kind).written:
         columns = [column[np.isfinite(column)] for column in values.T]
-        is_coarse = any(lattice(column) for column in columns)
+        estimate = frame_noise if any(lattice(column) for column in columns) else noise_by_size
         result = np.full(values.shape, np.inf)
         for noise, column, present in zip(result.T, columns, np.isfinite(values).T, strict=True):
-            if is_coarse:
-                noise[present] = np.maximum(frame_noise(column), typical_noise(column[:, None]))
-            else:
-                noise[present] = np.maximum(noise_by_size(column), 1e-6 * np.ptp(column) + NO_NOISE)
+            noise[present] = np.maximum(estimate(column), 1e-6 * np.ptp(column) + NO_NOISE)
         return result
     if sensor.zero is not None and is_encoder(measurement):
         noise = frame_noise(values[:, 0])

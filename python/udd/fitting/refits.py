@@ -13,35 +13,31 @@ from udd.effects import Effect, Parameter
 from .fit_result import Fit, minimise
 from .minimum import SolveError
 from .model_error_schedule import ANY, NAT, Goal, far_off, increase_model_error, solve
-from .noise import stated
 from .noise_estimation import FINEST, least_noise, own_noise, solve_with_noise
 from .parameters import Free
 from .problem import Point, Problem, levels, start_point
 from .record import Record
 
 
-def widened(fitted: Fit, effects: Sequence[Effect], start: Fit | None = None) -> tuple[Problem, Point]:
-    """Add effects, with fixed parameters, to the problem of a fit; return it with the fit's end point.
-
-    `start` may be another fit of the same data whose end point is used instead.
-    """
+def widened(fitted: Fit, effects: Sequence[Effect]) -> tuple[Problem, Point]:
+    """Add effects, with fixed parameters, to the problem of a fit; return it with the fit's end point."""
     models = tuple(model.with_effects((*model.effects, *effects)) for model in fitted.models)
     known_count = len(fitted.model.parameters)
     effect_values = [value for effect in effects for value in effect.values]
-    end = (start or fitted).point.with_values(lambda values: [*values[:known_count], *effect_values])
+    end = fitted.point.with_values(lambda values: [*values[:known_count], *effect_values])
     return replace(fitted.problem, models=models), end
 
 
-def started_at(fitted: Fit, last: Fit, seen: NDArray[np.bool_] | None = None) -> Fit:
+def started_at(fitted: Fit, last: Fit, seen: slice | NDArray[np.bool_] = slice(None)) -> Fit:
     """Return a fit that continues from the end of another one, which may have more effects.
 
-    The same parameters are free as in `last`. `seen` masks the frames that `last` was fitted to; None for
-    all. The other frames start at the states as read.
+    The same parameters are free as in `last`. `seen` selects the frames that `last` was fitted to. The other
+    frames start at the states as read.
     """
     known_count = len(fitted.model.parameters)
     free = tuple(f for f in last.problem.free if f.role != "model" or f.index < known_count)
     states = fitted.record.states.copy()
-    states[slice(None) if seen is None else seen] = last.states
+    states[seen] = last.states
     end = Point(states, last.point.with_values(lambda values: values[:known_count]).sets)
     return replace(fitted, problem=_with_free(fitted, free), point=end)
 
@@ -95,15 +91,12 @@ def as_stated(fitted: Fit) -> Fit:
     profile = fitted.model.profile
 
     def kept(free: Free) -> bool:
-        name = free.name.partition("[")[0]
         if free.role == "model":
-            return name not in profile.fit.stated
-        return free.role == "camera" and name in profile.sensor.pivot
+            return free.base not in profile.fit.stated
+        return free.role == "camera" and free.base in profile.sensor.pivot
 
-    free = tuple(parameter for parameter in fitted.problem.free if kept(parameter))
-    problem = replace(fitted.problem, free=free, noise=stated(fitted.record))
-    start = start_point(problem.models, fitted.measurements, fitted.record)
-    return solve_with_noise(problem, start)
+    problem = replace(fitted.problem, free=tuple(filter(kept, fitted.problem.free)))
+    return solve_with_noise(problem, start_point(problem.models, fitted.measurements, fitted.record))
 
 
 def released(fitted: Fit, free: Sequence[Free]) -> Fit:
@@ -113,14 +106,12 @@ def released(fitted: Fit, free: Sequence[Free]) -> Fit:
     value.
     """
     # Without this, a spurious slip follows a load-dependent drive.
-    problem = _with_free(fitted, free)
-    return solve(problem, problem.schedule, fitted.point)
+    return solve(_with_free(fitted, free), fitted.problem.schedule, fitted.point)
 
 
 def released_anew(fitted: Fit, free: Sequence[Free]) -> Fit:
     """Fit as :func:`released` does, and estimate the noise again: a diverged model hardly shows it."""
-    problem = replace(_with_free(fitted, free), noise=stated(fitted.record))
-    return solve_with_noise(problem, fitted.point)
+    return solve_with_noise(_with_free(fitted, free), fitted.point)
 
 
 def _with_free(fitted: Fit, free: Sequence[Free]) -> Problem:

@@ -64,7 +64,7 @@ def lattice(values: Array) -> float:
 
 
 def roughness(values: Array) -> Array:
-    """Estimate the noise of evenly spaced columns (n, c) from differences of several orders.
+    """Estimate the noise of evenly spaced columns, (n,) or (n, c), from differences of several orders.
 
     The least of the estimates counts. Differences of a smooth motion decrease with their order; those of
     noise have its variance times the central binomial coefficient.
@@ -75,7 +75,7 @@ def roughness(values: Array) -> Array:
 
 
 def noise_by_differences(values: Array, order: int) -> Array:
-    """Compute the s.d. of white noise with differences of this order as large as those of columns (n, c)."""
+    """Compute the s.d. of white noise with differences of this order as large as those of columns."""
     size = np.median(np.abs(np.diff(values, order, axis=0)), axis=0) / 0.6745
     result: Array = size / math.sqrt(math.comb(2 * order, order))
     return result
@@ -87,7 +87,7 @@ def reads(values: Array) -> tuple[float, float]:
     A sensor with steps larger than its noise mostly repeats its readings: the noise is then that of the step.
     """
     step = lattice(values)
-    return max(float(roughness(values[:, None])[0]), step / math.sqrt(12.0)), step
+    return max(float(roughness(values)), step / math.sqrt(12.0)), step
 
 
 def frame_noise(values: Array) -> Array:
@@ -142,7 +142,7 @@ def noise_by_size(values: Array) -> Array:
     >>> float(np.ptp(noise_by_size(x + 0.1 * white)))
     0.0
     """
-    same = np.full(len(values), float(roughness(values[:, None])[0]))
+    same = np.full(len(values), float(roughness(values)))
     if len(values) < 10 * _NEAR:
         return same
     for order in _ORDERS:

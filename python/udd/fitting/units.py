@@ -77,19 +77,6 @@ class Scale:
 STATED = Scale({}, {})
 
 
-def ask(measurements: Sequence[Measurement], models: Sequence[Model]) -> None:
-    """Reject numbers that cannot be in s, m and rad, before a fit tries to follow them.
-
-    Raises
-    ------
-    FitError
-        With the numbers, and the units that they may be in.
-    """
-    for measurement, model in zip(measurements, models, strict=True):
-        if mistaken := _mistaken(measurement, model, STATED):
-            raise FitError(mistaken)
-
-
 def _mistaken(measurement: Measurement, model: Model, scale: Scale) -> str | None:
     """Return the message about numbers that cannot be in a unit, or None."""
     seen = measurement.seen
@@ -220,8 +207,11 @@ def astray(fitted: Fit) -> bool:
 
     A missing effect can do the same: :func:`udd.fitting.units.other_unit` distinguishes the two.
     """
-    pairs = zip(fitted.models, fitted.problem.models, strict=True)
-    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or any(_is_frequency_off(*pair) for pair in pairs)
+    pairs, pace = zip(fitted.models, fitted.problem.models, strict=True), fitted.model.profile.fit.pace
+    is_frequency_off = pace is not None and any(
+        _is_far(pace(end.parameters) / pace(given.parameters), _MAX_FREQUENCY_RATIO) for end, given in pairs
+    )
+    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or is_frequency_off
 
 
 def ran_away(fitted: Fit) -> bool:
@@ -231,16 +221,8 @@ def ran_away(fitted: Fit) -> bool:
     a drive a fifth of the given one.
     """
     stated = fitted.model.profile.fit.stated
-    parts = [f for f in fitted.problem.free if f.role != "model" or f.name.partition("[")[0] in stated]
+    parts = [f for f in fitted.problem.free if f.role != "model" or f.base in stated]
     return any(abs(fitted.point.value(f) - f.mean) > _RUNAWAY_SD * f.sd for f in parts)
-
-
-def _is_frequency_off(fitted: Model, given: Model) -> bool:
-    """Return True if the measured frequency is far from the model's, as a pendulum's may be."""
-    pace = given.profile.fit.pace
-    return pace is not None and _is_far(
-        pace(fitted.parameters) / pace(given.parameters), _MAX_FREQUENCY_RATIO
-    )
 
 
 def _is_drive_off(measurement: Measurement, model: Model) -> bool:
@@ -270,7 +252,9 @@ def checked_units(
     measurements = (measurement,) if isinstance(measurement, Measurement) else tuple(measurement)
     models = one_model_each(model, measurements)
     free_parameters(models, **options)  # raises if an option is wrong
-    ask(measurements, models)
+    for pair in zip(measurements, models, strict=True):
+        if mistaken := _mistaken(*pair, STATED):
+            raise FitError(mistaken)
     free, unknown = options["free"], models[0].profile.fit.unknown
 
     def doubt(ends: Sequence[Sequence[Model]] = ()) -> str | None:
