@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from udd._core import Linearised
     from udd.models import Model
 
-    from .noise import Noise
     from .parameters import Free
-    from .record import Record
 
 Array = NDArray[np.float64]
 
@@ -48,12 +46,6 @@ class Observations:
     linked: NDArray[np.bool_]
     film: NDArray[np.int64]
     autocorrelation: list[float]
-
-    @classmethod
-    def of(cls, record: Record, noise: Noise, omega: Array) -> Observations:
-        """Combine a record with its noise, which may grow with the angular speed `omega` (n,), rad/s."""
-        information = noise.information(record, omega)
-        return cls(record.t, record.seen, information, record.linked, record.film, noise.memory.tolist())
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
@@ -11,15 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from udd._util.arguments import checked_arguments
 from udd._util.drawable import Drawable
-from udd._util.keywords import renamed, renamed_attribute
+from udd._util.keywords import renamed_attribute
 from udd._util.value_text import with_error
-from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
+from . import uncertainty_budget
 from .diagnostics import Diagnostics, doubts, units
 from .minimum import DONE, MOST, minimum
 from .noise import Noise, colour
@@ -27,7 +25,6 @@ from .parameter_meanings import meaning
 from .problem import Point, Problem
 from .record import Record
 from .sensor import geometry_limits
-from .uncertainty_budget import Budget, budget
 
 Array = NDArray[np.float64]
 
@@ -253,28 +250,7 @@ class Fit(Drawable):
         result.__dict__["doubts"] = self.doubts
         return result
 
-    @renamed(held="fixed")
-    @checked_arguments(error=FitError)
-    def budget(self, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
-        """Compute the GUM uncertainty budget of the parameters.
-
-        Parameters
-        ----------
-        fixed : mapping of str to float, optional
-            Standard uncertainties of the fixed parameters.
-        k : float
-            The coverage factor.
-
-        Returns
-        -------
-        Budget
-            Uncertainty of each parameter by source.
-
-        See Also
-        --------
-        udd.fitting.uncertainty_budget.budget : explains the arguments.
-        """
-        return budget(self, fixed, k)
+    budget = uncertainty_budget.budget
 
     def summary(self) -> str:
         """Summarise the fit on one screen: its diagnostics, and every parameter with its unit.

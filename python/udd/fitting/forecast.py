@@ -34,11 +34,12 @@ from udd.simulation.outcomes import FINISHED
 from udd.simulation.trajectory import method_for
 
 from .continuous import continuous
-from .estimator_input import EstimatorInput, FilmParameters, Observations
+from .estimator_input import FilmParameters
 from .fit import fit
 from .fit_result import Fit
 from .formula_models import driven
 from .prediction import predicted
+from .problem import Point
 from .record import Record, record_of
 from .time_scale import motion_time_scale
 
@@ -279,7 +280,7 @@ def forecast(
     large = profile.fit.valid_error if error is None else float(error)
     times = _times(profile.fit.ahead * unit if t is None else t, _STEP * unit)
     length = float(profile.fit.window * unit if window is None else window)
-    record = record_of(past, fitted.model if profile.written else None)
+    record = record_of(past, fitted.model)
     film = _film(fitted, measurement, film)
     if any(_same(fitted.measurements[film], each) for each in (measurement, past)):
         is_gross = (fitted.noise.weight == 0.0) & (fitted.record.film == film)
@@ -290,13 +291,12 @@ def forecast(
     film_model = fitted.models[film]
     if isinstance(film_model, FormulaModel) and film_model.inputs:
         (film_model,) = driven((film_model,), (measurement,), origin)
-    models, cameras, states = _starts(fitted, film_model, film, part, members, scale, random)
+    models, sets, states = _starts(fitted, film_model, film, part, members, scale, random)
     kicks = scale * np.array(fitted.problem.diffusion) if process else np.zeros(states.shape[1])
-    clock_error = fitted.point.sets[film].clock
     t_model = part.t[-1] + times
-    runs = _runs(models, states, (1.0 + clock_error) * t_model, kicks, _KICK * unit, random)
+    runs = _runs(models, states, (1.0 + sets[0].clock) * t_model, kicks, _KICK * unit, random)
     shown = [fitted.channels.index(name) for name in measurement.names]
-    seen = _observed(models, cameras, clock_error, t_model, runs)[..., shown]
+    seen = _observed(models, sets, t_model, runs)[..., shown]
     is_regular = ~np.isin(np.arange(len(past)), record.row[record.odd])
     spread = np.nanstd(past.values[is_regular], axis=0)
 
@@ -385,11 +385,11 @@ def _starts(
     members: int,
     scale: float,
     rng: np.random.Generator,
-) -> tuple[list[Model], list[list[float]], Array]:
-    """Draw every member's model, camera and state at the window's end."""
-    seen = Observations.of(part, fitted.noise.of(part), part.states[:, 0])
-    (_values, camera_of_fit, clock), diffusion = fitted.point.sets[film], fitted.problem.diffusion
-    models, cameras, states = [], [], []
+) -> tuple[list[Model], list[FilmParameters], Array]:
+    """Draw every member's model, parameters (with the camera's) and state at the window's end."""
+    _values, camera_of_fit, clock = fitted.point.sets[film]
+    fixed = fitted.problem.of_states(part).at(Point(part.states, fitted.point.sets))
+    models, sets, states = [], [], []
     free = [f for f in fitted.problem.free if f.film in (None, film)]
     names = {f.name: list(film_model.parameters)[f.index] for f in free if f.role == "model"}
     draws = _draws(fitted, scale, rng)
@@ -399,16 +399,16 @@ def _starts(
         for parameter in free:
             if parameter.role == "camera":
                 camera[parameter.index] = draw[parameter.name]
+        drawn = FilmParameters(list(model.parameters.values()), camera, clock)
         try:
-            films = [FilmParameters(list(model.parameters.values()), camera, clock)]
-            fixed = EstimatorInput(model, seen, part.states, films, (), diffusion)
-            _first, last, spread = _core.filter(fixed, [(0, len(part.t) - 1)])
+            member = replace(fixed, model=model, films=[drawn])
+            _first, last, spread = _core.filter(member, [(0, len(part.t) - 1)])
         except ValueError as error:
             raise FitError(f"the state cannot be filtered from the window: {error}") from error
         models.append(model)
-        cameras.append(camera)
+        sets.append(drawn)
         states.append(last[0] + scale * _normal(spread[0], rng))
-    return models, cameras, np.array(states)
+    return models, sets, np.array(states)
 
 
 def _valid(
@@ -486,14 +486,13 @@ def _between_wheels(model: Model, states: Array) -> NDArray[np.bool_]:
     return inside(model.parameters, states)
 
 
-def _observed(models: list[Model], cameras: list[list[float]], clock: float, t: Array, runs: Array) -> Array:
+def _observed(models: list[Model], sets: list[FilmParameters], t: Array, runs: Array) -> Array:
     """Compute the observations of each member's camera, (n, k, m)."""
     seen = []
-    for model, camera, run in zip(models, cameras, runs, strict=True):
+    for model, drawn, run in zip(models, sets, runs, strict=True):
         there = np.isfinite(run).all(axis=1)
-        sets = [FilmParameters(list(model.parameters.values()), camera, clock)]
         film = np.zeros(int(there.sum()), dtype=np.int64)
-        shown = predicted([model], sets, film, t[there], run[there], t[there, None])[:, 0]
+        shown = predicted([model], [drawn], film, t[there], run[there], t[there, None])[:, 0]
         full = np.full((len(t), shown.shape[1]), np.nan)
         full[there] = shown
         seen.append(full)

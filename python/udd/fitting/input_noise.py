@@ -15,8 +15,6 @@ from udd.models.formula_model import FormulaModel
 from .record import Record
 from .sensor import noise_by_differences
 
-__all__ = ["LEVEL_RATIO", "NoisyInput", "diffusion_by_noise", "noise_of", "noisy_inputs"]
-
 Array = NDArray[np.float64]
 
 #: Factor by which a model error may differ from that caused by the inputs' noise: the ratio of adjacent

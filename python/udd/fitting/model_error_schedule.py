@@ -129,8 +129,9 @@ def provisional_fit(
     problem: Problem, point: Point, iterations: int = STEPS, enough: float | None = None
 ) -> Fit:
     """Fit on the way to a smaller model error; with noise autocorrelation if its likelihood matters."""
-    result = _nearly(minimise(problem, point, iterations, enough or _enough(problem)), iterations)
-    return with_noise_correlation(result, enough) if problem.likeliest and result.converged else result
+    decrease = enough or (DONE if problem.has_smallest_model_error else ROUGH)
+    result = _nearly(minimise(problem, point, iterations, decrease), iterations)
+    return with_noise_correlation(result, decrease) if problem.likeliest and result.converged else result
 
 
 def _nearly(fitted: Fit, steps: int) -> Fit:
@@ -144,11 +145,6 @@ def _nearly(fitted: Fit, steps: int) -> Fit:
         return fitted
     continued = minimise(fitted.problem, fitted.point, _LITTLE, ROUGH)
     return continued if continued.converged else fitted
-
-
-def _enough(problem: Problem) -> float:
-    """Return the decrease of chi2 at which a fit stops: the final one at the last level."""
-    return DONE if problem.has_smallest_model_error else ROUGH
 
 
 def _stands(tighter: Fit, looser: Fit) -> bool:
@@ -234,8 +230,8 @@ def with_negligible_model_error(fitted: Fit) -> Fit:
     )
 
 
-def with_noise_correlation(fitted: Fit, enough: float | None = None) -> Fit:
-    """Refit with AR(1) noise if that raises the likelihood, until chi2 falls by less than `enough`.
+def with_noise_correlation(fitted: Fit, decrease: float) -> Fit:
+    """Refit with AR(1) noise if that raises the likelihood, until chi2 falls by less than `decrease`.
 
     Frames with correlated noise carry less information than independent ones. Without this the model error
     would be too large, following the noise, and standard errors would be too small.
@@ -247,5 +243,5 @@ def with_noise_correlation(fitted: Fit, enough: float | None = None) -> Fit:
     if not memory.any() or np.abs(memory - fitted.noise.memory).max() < _SAME:
         return fitted
     problem = replace(fitted.problem, noise=replace(estimated(fitted), memory=memory))
-    result = minimise(problem, fitted.point, STEPS, enough or _enough(problem))
+    result = minimise(problem, fitted.point, STEPS, decrease)
     return result if result.converged and result.evidence > fitted.evidence + LESS else fitted

@@ -13,7 +13,8 @@ from udd import _core
 from udd.errors import FitError
 from udd.models import Model
 
-from .estimator_input import EstimatorInput, FilmParameters, Observations
+from .estimator_input import FilmParameters
+from .problem import Point
 
 if TYPE_CHECKING:
     from .fit_result import Fit
@@ -76,12 +77,12 @@ def _as_far_as_it_runs(run: Callable[[Array], Array], t0: Array, times: Array) -
 
 
 def filtered(
-    fitted: Fit, record: Record, windows: NDArray[np.int64], diffusion: Sequence[float]
+    fitted: Fit, record: Record, windows: NDArray[np.int64], diffusion: tuple[float, ...]
 ) -> tuple[Array, Array, Array]:
     """Filter windows of frames: states at the first and the last frame, covariance of the last.
 
     All parameters are those of a fit.
     """
-    seen = Observations.of(record, fitted.noise.of(record), record.states[:, 0])
-    fixed = EstimatorInput(fitted.model, seen, record.states, fitted.point.sets, (), diffusion)
+    problem = fitted.problem.of_states(record).with_model_error(diffusion)
+    fixed = problem.at(Point(record.states, fitted.point.sets))
     return _core.filter(fixed, [(int(a), int(b)) for a, b in windows])

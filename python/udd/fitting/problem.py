@@ -75,9 +75,17 @@ class Problem(OneLine):
         more = (Free(name, "model", order.index(name), *prior) for name, prior in priors.items())
         return replace(self, free=(*self.free, *more))
 
+    def of_states(self, record: Record) -> Problem:
+        """Return the problem of another record with its states as the only unknowns."""
+        return replace(self, record=record, free=(), noise=self.noise.of(record))
+
     def at(self, point: Point) -> EstimatorInput:
         """Return the problem at a point, as input of the core's estimator."""
-        observations = Observations.of(self.record, self.noise, point.states[:, 0])
+        record, noise = self.record, self.noise
+        information = noise.information(record, point.states[:, 0])
+        observations = Observations(
+            record.t, record.seen, information, record.linked, record.film, noise.memory.tolist()
+        )
         return EstimatorInput(
             self.models[0], observations, point.states, point.sets, self.free, self.diffusion, point.linear
         )

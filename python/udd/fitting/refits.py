@@ -212,9 +212,7 @@ def smoothed_states(fitted: Fit, record: Record, level: int) -> Fit:
 
     A wrong model may not reach that level; the result's level says how far it came.
     """
-    noise = fitted.noise.of(record)
-    problem = replace(fitted.problem, record=record, free=(), models=fitted.models, noise=noise)
-    start = Point(record.states, fitted.point.sets)
+    problem, start = fitted.problem.of_states(record), Point(record.states, fitted.point.sets)
     return solve(problem, problem.schedule[: level + 1], start)
 
 

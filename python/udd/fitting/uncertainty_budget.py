@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from udd._util.arguments import checked_arguments
 from udd._util.keywords import renamed
 from udd._util.one_line import OneLine
 from udd._util.validation import number
@@ -108,6 +109,7 @@ class Budget(OneLine):
 
 
 @renamed(held="fixed")
+@checked_arguments(error=FitError)
 def budget(fit: Fit, fixed: Mapping[str, float] | None = None, k: float = 2.0) -> Budget:
     """Compute the uncertainty budget (GUM) of a fit's numbers.
 

@@ -207,11 +207,12 @@ def astray(fitted: Fit) -> bool:
 
     A missing effect can do the same: :func:`udd.fitting.units.other_unit` distinguishes the two.
     """
+    if fitted.scatter > UNEXPLAINED or ran_away(fitted):
+        return True
     pairs, pace = zip(fitted.models, fitted.problem.models, strict=True), fitted.model.profile.fit.pace
-    is_frequency_off = pace is not None and any(
+    return pace is not None and any(
         _is_far(pace(end.parameters) / pace(given.parameters), _MAX_FREQUENCY_RATIO) for end, given in pairs
     )
-    return fitted.scatter > UNEXPLAINED or ran_away(fitted) or is_frequency_off
 
 
 def ran_away(fitted: Fit) -> bool:
