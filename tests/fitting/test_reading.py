@@ -138,5 +138,5 @@ def test_an_encoder_that_never_moves_says_so():
 
 def test_means_of_an_encoders_readings_are_still_an_encoders():
     record = swing(2 * np.pi / 4096, 1e-4, duration=400.0)
-    means = thinned(record, (0,))
+    means = thinned(record)
     assert is_encoder(record) and means.every > 1 and is_encoder(means.measurement)

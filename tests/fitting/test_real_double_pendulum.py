@@ -10,6 +10,7 @@ import pytest
 import udd
 from udd.fitting import Fit, extend, fit_record, record_of
 from udd.fitting.thinning import thinned
+from udd.measurement.unwrapping import unwrapped
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "driven"
 HORIZONS = (0.1, 0.5, 1.0, 2.0)  # s
@@ -37,7 +38,7 @@ def errors(fit: Fit, other: udd.Measurement) -> list[float]:
 
 
 def test_dry_friction_in_the_second_joint_halves_errors_on_a_record_that_no_fit_saw() -> None:
-    thin = thinned(read("00"), ["a1", "a2"])
+    thin = thinned(unwrapped(read("00"), ["a1", "a2"]))
     assert thin.every == 5
     baseline = udd.pendulum_chain(
         [0.5594, 0.6043],

@@ -57,11 +57,11 @@ def minimum(problem: Problem, point: Point, iterations: int = MOST, decrease: fl
         if len(error.args) == 2:
             unsolved.undetermined = tuple(problem.free[k].name for k in error.args[1])
         raise unsolved from error
-    sets = tuple(FilmParameters(*film_parameters) for film_parameters in result["sets"])
+    sets = tuple(FilmParameters(*film) for film in result["sets"])
     try:
         models = tuple(
-            model.with_parameters(dict(zip(model.parameters, values, strict=True)))
-            for model, (values, _camera, _clock) in zip(problem.models, sets, strict=True)
+            model.with_parameters(dict(zip(model.parameters, film.model, strict=True)))
+            for model, film in zip(problem.models, sets, strict=True)
         )
     except ModelError as error:  # a shape left its range
         raise SolveError(f"the fit reached parameters that are invalid for the model: {error}") from error

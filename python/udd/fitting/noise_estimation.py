@@ -12,7 +12,6 @@ from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import profile_of
 
-from .estimator_input import FilmParameters
 from .fit_result import Fit, minimise
 from .minimum import MOST
 from .model_error_schedule import FEW, LEAP, ROUGH, provisional_fit, solve
@@ -97,12 +96,12 @@ def _afresh(fitted: Fit) -> Point:
     While the states follow the frames, a law that is nonlinear in the speed, such as friction, may come out
     flat, and would then stay flat.
     """
-    sets = [FilmParameters([*values], camera, clock) for values, camera, clock in fitted.point.sets]
+    sets = fitted.point.with_values(list).sets
     for free in fitted.problem.free:
         if free.role == "model" and np.isfinite(free.sd):
-            for values, _camera, _clock in sets if free.film is None else [sets[free.film]]:
-                values[free.index] = free.mean
-    return Point(fitted.states, tuple(sets))
+            for film in sets if free.film is None else [sets[free.film]]:
+                film.model[free.index] = free.mean
+    return Point(fitted.states, sets)
 
 
 def _is_known(measurement: Measurement) -> bool:

@@ -115,13 +115,12 @@ class Point(OneLine):
 
     def with_values(self, change: Callable[[list[float]], list[float]]) -> Point:
         """Return the point with the values of every film's model changed."""
-        sets = (FilmParameters(change(values), camera, clock) for values, camera, clock in self.sets)
-        return Point(self.states, tuple(sets))
+        return Point(self.states, tuple(film._replace(model=change(film.model)) for film in self.sets))
 
     def value(self, free: Free) -> float:
         """Return the value of a free parameter."""
-        model, camera, clock = self.sets[free.film or 0]
-        return {"model": model, "camera": camera}[free.role][free.index] if free.role != "clock" else clock
+        film = self.sets[free.film or 0]
+        return {"model": film.model, "camera": film.camera, "clock": [film.clock]}[free.role][free.index]
 
 
 def start_point(models: Sequence[Model], measurements: Sequence[Measurement], record: Record) -> Point:

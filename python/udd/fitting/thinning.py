@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from udd.measurement import Measurement
-from udd.measurement.unwrapping import unwrapped
 from udd.models import profile_of
 
 from .outliers import odd_frames
@@ -56,20 +54,13 @@ class Thinned:
     steps: dict[str, float]
 
 
-def thinned(measurement: Measurement, angles: Collection[str] = ()) -> Thinned:
-    """Average blocks of frames if a long record loses no information by it.
+def thinned(measurement: Measurement) -> Thinned:
+    """Average blocks of frames if a long record, whose angles are continuous, loses no information by it.
 
     Blocks are short compared with the time in which the motion changes. The effect of the motion's curvature
     is subtracted from each mean (to the fourth order in the block's length), and blocks are short enough that
     the rest is below the noise of a mean.
-
-    Parameters
-    ----------
-    measurement : Measurement
-    angles : collection of str
-        Columns that are angles, in addition to those of a disk or a pendulum.
     """
-    measurement = unwrapped(measurement, angles)
     n = int(measurement.seen.sum())
     many = MANY_DRIVEN if measurement.inputs else MANY
     # A frame without one of the columns counts as lost; sensors with different rates have no common blocks.
