@@ -68,7 +68,7 @@ class Fit(Drawable):
         Model error of the parameters and their covariance, per square root of a second, if it is below that
         of `problem`. The numbers of a right law do not depend on it.
     unit_doubt : str or None
-            Sentence about a unit that explains the record far better than the given one.
+        Sentence about a unit that explains the record far better than the given one.
 
     See Also
     --------

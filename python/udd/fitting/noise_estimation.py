@@ -32,7 +32,7 @@ Misfits = Literal["noise", "little", "faults"]
 
 
 def solve_with_noise(problem: Problem, point: Point) -> Fit:
-    """Solve the problem while the model error is reduced step by step, and the noise is estimated anew.
+    """Solve the problem while the model error is reduced step by step; estimate the noise again on the way.
 
     The noise is estimated at the largest model error at which the misfits show it, because a wrong model does
     least harm there. It is estimated again at the last level, if the model reaches it. At still larger model
