@@ -17,7 +17,7 @@ from udd.discovery.discover import TRAIN
 from udd.discovery.score_rounds import score_round
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.term_library import given_terms
-from udd.discovery.search import Search
+from udd.discovery.search import Search, SearchPath
 from udd.discovery.time_budget import Clock
 from udd.discovery.trial_fits import fitted_ones, of_library
 from udd.errors import FitError, ModelError
@@ -206,18 +206,18 @@ def test_an_effect_that_a_later_one_makes_needless_is_left_out() -> None:
     train = frames.first(TRAIN)
     part, whole = (fit_record(record, some, baseline, search=True) for some in (frames.part(train), frames))
     search = Search(Acceptance(frames, ~train, Clock(None, lambda _text: None), motion_time_scale(part)))
-    states, accepted, rounds = [SearchState(part, whole, search.tests.errors(part))], [], []
+    path = SearchPath([SearchState(part, whole, search.tests.errors(part))])
     for title in ("v^3 in v'", "v in v'"):
-        rounds.append(score_round(states[-1].part))
-        (wanted,) = (s for s in rounds[-1].library.scored if s.candidate.title == title)
-        trial = of_library(states[-1].part, [wanted.candidate], list(wanted.amplitudes))
-        step = search.tests.best(states[-1], fitted_ones([trial]), rounds[-1])
+        path.rounds.append(score_round(path.states[-1].part))
+        (wanted,) = (s for s in path.rounds[-1].library.scored if s.candidate.title == title)
+        trial = of_library(path.states[-1].part, [wanted.candidate], list(wanted.amplitudes))
+        step = search.tests.best(path.states[-1], fitted_ones([trial]), path.rounds[-1])
         assert step
-        accepted.append(step[0])
-        states.append(step[1])
-    search._leave_out(accepted, states, rounds)
-    assert [[c.title for c in step.candidates] for step in accepted] == [["v in v'"]]
-    assert len(states) == 2 and len(rounds) == 1
+        path.steps.append(step[0])
+        path.states.append(step[1])
+    search._leave_out(path)
+    assert [[c.title for c in step.candidates] for step in path.steps] == [["v in v'"]]
+    assert len(path.states) == 2 and len(path.rounds) == 1
 
 
 @pytest.mark.nightly  # test_friction_in_both_joints_is_found_by_joint asks the same of forces

@@ -44,16 +44,13 @@ def fits(monkeypatch):
         ([OFFSET, NARROW], 900.0),
     ]
 
-    def fit(_current: Any, group: Any, goal: Any = None) -> Any:
+    def fit(_current: Any, group: Any, goal: Any = None, _first: Any = None) -> Any:
         limit = goal.chi2 if goal else float("inf")
         made.append((list(group), limit))
         value = next(chi2 for pair, chi2 in pairs if pair == list(group))
         return trial(*group, chi2=value) if value < limit else None
 
-    monkeypatch.setattr(proposals, "from_none", fit)
-    monkeypatch.setattr(
-        proposals, "with_more", lambda current, _first, group, goal: fit(current, group, goal)
-    )
+    monkeypatch.setattr(proposals, "of_several", fit)
     return made
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan
@@ -17,10 +18,8 @@ from udd.discovery.validation.confirmation import Pair, confirmed_by, same_level
 from udd.discovery.validation.held_out_errors import (
     Errors,
     Ratio,
-    comparison_horizon,
     held_out_errors,
     improvement,
-    whole_improvement,
 )
 from udd.discovery.validation.sensor_drift import drift_gain
 from udd.errors import FitError
@@ -168,6 +167,11 @@ class Acceptance:
         """Names of the known model's free parameters."""
         return [f.name for f in self.free if f.role == "model"]
 
+    def refitted(self, state: SearchState, work: Callable[[Fit], Fit]) -> SearchState:
+        """Refit the training part and all data, with their held-out errors; once if they are one fit."""
+        fits = parallel_map(work, [state.part] if state.part is state.whole else [state.part, state.whole])
+        return SearchState(fits[0], fits[-1], self.errors(fits[0]))
+
     def errors(self, fitted: Fit) -> Errors:
         """Compute the held-out errors of a fit of the training part."""
         return held_out_errors(fitted, self.record, self.held_out, unit=self.unit)
@@ -178,9 +182,7 @@ class Acceptance:
         For the disk, which is chaotic, it is taken at the horizon of comparison; for a pendulum over the
         whole run.
         """
-        if before.unit == "rad":
-            return whole_improvement(before, after)
-        return improvement(before, after, comparison_horizon(before))
+        return improvement(before, after, before.horizon)
 
     def best(
         self, current: SearchState, trials: list[TrialFit], scores: ScoreRound
@@ -384,9 +386,8 @@ class Acceptance:
 
     def worse(self, before: Errors, after: Errors) -> bool:
         """Return True if a chaotic model's forecasts get significantly worse at some horizon."""
-        return before.unit != "rad" and any(
-            improvement(before, after, h)[1] > _WORSE for h in before.horizons
-        )
+        chaotic = before.horizon is not None
+        return chaotic and any(improvement(before, after, h)[1] > _WORSE for h in before.horizons)
 
     def _alternatives(
         self, chosen: Hypothesis, order: Sequence[Hypothesis], scanned: Scan

@@ -47,7 +47,7 @@ from udd.models.formula_model import FormulaModel
 
 from .acceptance import Acceptance, SearchState, Step
 from .results import AddedEffect, Discovery, RejectedEffect
-from .search import Outcome, Search, map_fits
+from .search import Outcome, Search
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
@@ -283,20 +283,20 @@ def _answer(
 ) -> Discovery:
     """Describe the end of a search, with its verdict."""
     baseline, before = known_fits.whole, known_fits.errors
-    final = refit(end.whole)
+    final = refit(end.state.whole)
     reported = eased(final) if final.scatter > UNEXPLAINED else final
     reported = replace(reported, unit_doubt=known_fits.part.unit_doubt).without_cache().with_diagnostics()
     added = [
-        replace(f, by_record=by_record(baseline, end.whole, f.effect, data.order)[0])
+        replace(f, by_record=by_record(baseline, end.state.whole, f.effect, data.order)[0])
         for step in end.accepted
         for f in _describe(step, reported)
     ]
     others = [a for step in end.accepted for a in step.alternatives]
-    is_incomplete = lacks_more(final, end.errors)
-    excused = camera_shows(baseline, end.whole) if added and not end.stopped else None
-    ratio = search.tests.improvement(before, end.errors) if added else (1.0, 1.0, 1.0)
+    is_incomplete = lacks_more(final, end.state.errors)
+    excused = camera_shows(baseline, end.state.whole) if added and not end.stopped else None
+    ratio = search.tests.improvement(before, end.state.errors) if added else (1.0, 1.0, 1.0)
     # Random forces predict nothing: only a law improves free runs that much.
-    random = as_random(baseline, end.whole) if added and ratio[2] > FORETELLS else None
+    random = as_random(baseline, end.state.whole) if added and ratio[2] > FORETELLS else None
     unexplained = not added and (
         max(baseline.scatter, final.scatter) > UNEXPLAINED
         or misses_the_motion(before, data.record, ~data.train)
@@ -322,13 +322,13 @@ def _answer(
         effects=added,
         alternatives=others,
         error_before=before,
-        error_after=end.errors,
+        error_after=end.state.errors,
         ratio=ratio,
         scans=[sorted(scores.library.scored, key=lambda s: -s.chi2) for scores in end.rounds],
         curves=[scores.curves for scores in end.rounds],
         comparisons=[scores.comparisons for scores in end.rounds],
         split=data.split,
-        trained=end.part.without_cache(),
+        trained=end.state.part.without_cache(),
         rejected=rejected,
         thinned=data.thin if any(part.every > 1 for part in data.thin) else [],
         budget=search.clock.budget if stopped else None,
@@ -421,8 +421,7 @@ def _begin(search: Search, start: SearchState) -> SearchState:
         return start
     # Without this a formula of the friction replaces a strong cubic drag.
     try:
-        part, whole = map_fits(as_stated, start.part, start.whole)
-        return SearchState(part, whole, search.tests.errors(part))
+        return search.tests.refitted(start, as_stated)
     except FitError:
         return start
 

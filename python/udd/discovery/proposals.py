@@ -20,11 +20,10 @@ from .time_budget import Clock
 from .trial_fits import (
     TrialFit,
     fitted_ones,
-    from_none,
     of_curve,
     of_library,
+    of_several,
     one_of_each,
-    with_more,
 )
 
 _TRIED = 12  # best candidates that are fitted in full
@@ -163,27 +162,18 @@ class Proposals:
         """
         scored = sorted((s for s in self.scores.library.scored if not s.absorbed), key=lambda s: -s.chi2)
         first: dict[str, Candidate] = {}
-        for entry in scored:
-            if (
-                entry.candidate.usual
-                and not entry.candidate.scanned
-                and entry.candidate.effect.name not in loose
-            ):
-                first.setdefault(entry.candidate.effect.name, entry.candidate)
+        for candidate in (s.candidate for s in scored):
+            if candidate.usual and not candidate.scanned and candidate.effect.name not in loose:
+                first.setdefault(candidate.effect.name, candidate)
         best = list(first.values())[:_PAIRED]
         pairs = [list(pair) for pair in itertools.combinations(best, 2)]
         # The best single effect may hide the rest: pair it with each of the best-scored effects that brake.
         leader = min(singles, key=lambda t: (-t.fit.level, t.fit.chi2 / 2 + t.cost), default=None)
         usable = list(dict.fromkeys(first.get(s.candidate.effect.name) for s in self.scores.usable()))
-        for other in filter(None, usable[:_PAIRED]):
-            pair = [leader.candidates[0], other] if leader else []
-            if (
-                pair
-                and pair[0].effect.name != other.effect.name
-                and pair not in pairs
-                and pair[::-1] not in pairs
-            ):
-                pairs.append(pair)
+        for other in usable[:_PAIRED]:
+            if leader and other and leader.candidates[0].effect.name != other.effect.name:
+                pair = [leader.candidates[0], other]
+                pairs += [pair] if pair not in pairs and pair[::-1] not in pairs else []
         # Joints of a machine may all have the same friction, whatever the scores around a wrong motion are.
         alike = [pair for pair in itertools.combinations(first.values(), 2) if pair[0].form == pair[1].form]
         pairs += [list(pair) for pair in alike if pair[0].form and not set(pair) <= set(best)]
@@ -196,9 +186,7 @@ class Proposals:
 
         def together(group: list[Candidate]) -> TrialFit | None:
             first = next((t for t in starts if t.candidates[0] in group), None)
-            if first is None:
-                return from_none(self.fit, group, goal)
-            return with_more(self.fit, first, group, goal)
+            return of_several(self.fit, group, goal, first)
 
         self.clock.trying([" with ".join(c.title for c in group) for group in groups])
         trials = fitted_ones(self.clock.each(together, groups))
@@ -217,4 +205,4 @@ class Proposals:
             for other in (s.candidate for s in self.scores.library.scored)
             if other.title == replaced.title and other is not replaced
         ]
-        return fitted_ones(self.clock.each(lambda group: from_none(self.fit, group), groups))
+        return fitted_ones(self.clock.each(lambda group: of_several(self.fit, group), groups))

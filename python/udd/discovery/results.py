@@ -14,7 +14,7 @@ from udd._util.value_text import with_error
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.by_record import RecordAnswer, sentence
-from udd.discovery.validation.held_out_errors import Errors, Ratio, comparison_horizon, lacks_more
+from udd.discovery.validation.held_out_errors import Errors, Ratio, lacks_more
 from udd.effects import Effect
 from udd.fitting import Fit
 from udd.fitting.diagnostics import ModelError, Reading, ran_off, rate_of, readings
@@ -243,8 +243,8 @@ class Discovery(Drawable):
     error_before, error_after : Errors
         Held-out errors of models fitted without the held-out data, with the noise floor.
     ratio : tuple of float
-        Held-out error after over before, with its 95 % interval. The disk's is at
-        :func:`comparison_horizon`, a pendulum's over the whole held-out part.
+        Held-out error after over before, with its 95 % interval: at :attr:`horizon`, or over the whole
+        held-out part.
     scans : list of list of Scored
         Scores of all candidates, for each round of the search, the best first.
     curves : list of list of Curve
@@ -341,7 +341,7 @@ class Discovery(Drawable):
     @property
     def horizon(self) -> float | None:
         """Horizon of `ratio`, s; None for the whole held-out part."""
-        return comparison_horizon(self.error_before) if self.error_before.unit != "rad" else None
+        return self.error_before.horizon
 
     @property
     def model(self) -> Model:

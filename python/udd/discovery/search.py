@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
-from udd._util.parallel import parallel_map
 from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scored
 from udd.discovery.validation.by_record import by_record, contested
-from udd.discovery.validation.held_out_errors import (
-    Errors,
-    confirmed,
-)
+from udd.discovery.validation.held_out_errors import confirmed
 from udd.discovery.validation.sensor_drift import as_random
 from udd.errors import FitError
-from udd.fitting import (
-    Fit,
-    ran_away,
-    released_anew,
-    started_at,
-)
+from udd.fitting import ran_away, released_anew, started_at
 
 from .acceptance import Acceptance, SearchState, Step
 from .proposals import Proposals
@@ -30,7 +21,7 @@ from .results import RejectedEffect
 from .score_rounds import ScoreRound, most_probable_first, score_round
 from .thresholds import ALPHA, RejectionReason
 from .time_budget import TimeUpError
-from .trial_fits import fitted_ones, needed_in, of_library
+from .trial_fits import TrialFit, fitted_ones, needed_in, of_library
 
 _NEAREST = 6  # closest candidates to report if none passes
 _MOST = 3  # maximum of added effects
@@ -38,24 +29,23 @@ _CURVES = 2  # most probable curves that are located
 _LIKELY = 0.5  # minimum evidence of these, as a share of the highest
 
 
-def map_fits(work: Callable[[Fit], Fit], part: Fit, whole: Fit) -> tuple[Fit, Fit]:
-    """Apply `work` to the training fit and the full-data fit; once if they are identical."""
-    if part is whole:
-        return (work(part),) * 2
-    training, full = parallel_map(work, (part, whole))
-    return training, full
+@dataclass
+class SearchPath:
+    """Accepted steps, the states before and after them, and the score round around each state."""
+
+    states: list[SearchState]
+    steps: list[Step] = field(default_factory=list)
+    rounds: list[ScoreRound] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of the search: training and full-data fits, held-out errors, accepted steps, score rounds.
+    """Result of the search: its last confirmed state, the steps to it, score rounds, unconfirmed effects.
 
     `stopped` is the activity at which the time was up.
     """
 
-    part: Fit
-    whole: Fit
-    errors: Errors
+    state: SearchState
     accepted: list[Step]
     rounds: list[ScoreRound]
     unconfirmed: list[RejectedEffect]
@@ -69,49 +59,45 @@ class Search:
         self.tests, self.given = tests, given
         self.clock, self.tell = tests.clock, tests.clock.tell
 
-    def run(self, begin: SearchState, known_model: SearchState | None = None) -> Outcome:
+    def run(self, begin: SearchState, known_model: SearchState) -> Outcome:
         """Add effects until none passes, starting at `begin`; `known_model` has the known model's fits."""
-        accepted: list[Step] = []
-        rounds: list[ScoreRound] = []
-        states = [begin]
-        stopped = None
+        path, stopped = SearchPath([begin]), None
         try:
             with self.clock.limited():
-                self._forward_selection(accepted, states, rounds)
+                self._forward_selection(path)
         except TimeUpError as up:
             stopped = str(up)
-        number = self._confirmed_by_free_runs(known_model or states[0], states)
-        unconfirmed = self._unconfirmed(known_model or states[0], accepted[number:], states[-1])
-        end = states[number] if number else known_model or states[0]
-        return Outcome(end.part, end.whole, end.errors, accepted[:number], rounds, unconfirmed, stopped)
+        number = self._confirmed_by_free_runs(known_model, path.states)
+        unconfirmed = self._unconfirmed(known_model, path.steps[number:], path.states[-1])
+        end = path.states[number] if number else known_model
+        return Outcome(end, path.steps[:number], path.rounds, unconfirmed, stopped)
 
-    def _forward_selection(
-        self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
-    ) -> None:
-        """Add effects to the lists as they pass."""
+    def _forward_selection(self, path: SearchPath) -> None:
+        """Add effects to the path as they pass."""
         seen_titles: set[tuple[str, ...]] = set()
-        while sum(len(step.candidates) for step in accepted) < _MOST:
-            self.tell("scoring candidates" + (" for a further effect" if accepted else ""))
+        states, rounds = path.states, path.rounds
+        while sum(len(step.candidates) for step in path.steps) < _MOST:
+            self.tell("scoring candidates" + (" for a further effect" if path.steps else ""))
             scores = score_round(states[-1].part, self.given, self.clock.watched)
             rounds.append(scores)
-            addition = self._addition(states[-1], scores, with_more=bool(accepted))
+            addition = self._addition(states[-1], scores, with_more=bool(path.steps))
             if addition is None:
                 break
-            accepted.append(addition[0])
+            path.steps.append(addition[0])
             states.append(addition[1])
-            self._backward_elimination(accepted, states, rounds)
+            self._backward_elimination(path)
             before_release, states[-1] = states[-1], self._released(states[-1])
-            if states[-1] is not before_release and accepted[-1].chosen.trial.is_curve:
+            if states[-1] is not before_release and path.steps[-1].chosen.trial.is_curve:
                 # Fixed parameters biased the curve and hid its formula; relocate it with all parameters free.
-                self._relocated(len(accepted) - 1, accepted, states, rounds)
+                self._relocated(path, len(path.steps) - 1)
             # An effect may replace another and be replaced by it again: then the search is circular.
-            titles = tuple(c.title for step in accepted for c in step.candidates)
+            titles = tuple(c.title for step in path.steps for c in step.candidates)
             if titles in seen_titles:
                 break
             seen_titles.add(titles)
             # A curve that free runs contradict is no basis for a further search.
             contradicted = self.tests.improvement(states[-2].errors, states[-1].errors)[1] > 1.0
-            if accepted[-1].curve is not None and contradicted:
+            if path.steps[-1].curve is not None and contradicted:
                 break
 
     def _confirmed_by_free_runs(self, known_model: SearchState, states: list[SearchState]) -> int:
@@ -156,16 +142,13 @@ class Search:
         if self.tests.all_are_free(state.part) and not reestimate_noise:
             return state
         try:
-            part, whole = map_fits(partial(released_anew, free=self.tests.free), state.part, state.whole)
-            if not (part.converged and whole.converged):
-                return state
-            errors = self.tests.errors(part)
-            strayed = ran_away(part) or ran_away(whole)
-            if strayed and not self.tests.improvement(state.errors, errors)[2] < 1.0:
-                return state
+            free = self.tests.refitted(state, partial(released_anew, free=self.tests.free))
         except FitError:
             return state
-        return state if self.tests.worse(state.errors, errors) else SearchState(part, whole, errors)
+        fits = free.part, free.whole
+        better = not any(map(ran_away, fits)) or self.tests.improvement(state.errors, free.errors)[2] < 1.0
+        is_usable = all(fit.converged for fit in fits) and better
+        return free if is_usable and not self.tests.worse(state.errors, free.errors) else state
 
     def rejected(
         self, base: SearchState, scores: ScoreRound, numbers: Sequence[int] = (0,)
@@ -244,85 +227,68 @@ class Search:
         trials = Proposals(current.part, scores, self.clock).curves(likely)
         return self.tests.best(current, trials, scores)
 
-    def _backward_elimination(
-        self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
-    ) -> None:
+    def _backward_elimination(self, path: SearchPath) -> None:
         """Remove effects that a later one makes needless.
 
         A wrong form of the library absorbs a part of an effect outside of it, or of another effect that is
         found later.
         """
-        self._leave_out(accepted, states, rounds)
-        for k in range(len(accepted) - 1):
-            last = accepted[-1]
-            if last.curve is None:
-                return
-            title = accepted[k].candidates[0].title
-            self.tell(f"trying {last.curve.title} instead of {title}")
+        self._leave_out(path)
+        *earlier, last = path.steps
+        for k, step in enumerate(earlier if last.curve else []):
+            self.tell(f"trying {last.curve.title} instead of {step.candidates[0].title}")
             # ODEBench 35: otherwise three effects replace one formula, with three times its held-out error.
-            if self._relocated(k, accepted, states, rounds):
+            if self._relocated(path, k):
                 return
 
-    def _relocated(
-        self, k: int, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]
-    ) -> bool:
+    def _relocated(self, path: SearchPath, k: int) -> bool:
         """Relocate the last curve in place of all steps from a number on; return True if that is better."""
-        before, curve = states[k], accepted[-1].curve
-        if curve is None:
-            return False
-        from_there = started_at(before.part, states[-1].part)
-        trials = Proposals(from_there, rounds[k], self.clock).curves([curve])
-        replacement = self.tests.best(before, trials, rounds[k])
-        if replacement is None:
-            return False
-        replacement = replacement[0], self._released(replacement[1], reestimate_noise=True)
-        if not self._likelier(replacement, accepted[k:], states[-1]):
-            return False
-        accepted[k:], states[k + 1 :], rounds[k + 1 :] = [replacement[0]], [replacement[1]], []
-        return True
+        curve = path.steps[-1].curve
+        start = started_at(path.states[k].part, path.states[-1].part)
+        trials = Proposals(start, path.rounds[k], self.clock).curves([curve] if curve else [])
+        return self._replaced(path, k, trials, reestimate_noise=True)
 
-    def _likelier(
-        self, replacement: tuple[Step, SearchState], steps: Sequence[Step], end: SearchState
-    ) -> bool:
-        """Return True if one step has a larger log evidence than several from the same start."""
-        step, state = replacement
-        try:
-            evidence = self.tests.log_evidence(state.whole, [step])
-            return evidence > self.tests.log_evidence(end.whole, steps)
-        except FitError:
-            return False
-
-    def _leave_out(self, accepted: list[Step], states: list[SearchState], rounds: list[ScoreRound]) -> None:
+    def _leave_out(self, path: SearchPath) -> None:
         """Remove effects of the library that are not significant next to those found after them.
 
         All of them are removed at once first: of two needless effects each may fail a test with the other
         present.
         """
-        whole = states[-1].whole
+        end = path.states[-1]
         idle = [
             (k, candidate)
-            for k, step in enumerate(accepted[:-1])
+            for k, step in enumerate(path.steps[:-1])
             for candidate in step.candidates
-            if not any(s.curve for s in accepted[k:]) and not needed_in(whole, candidate.amplitude_names)
+            if not any(s.curve for s in path.steps[k:])
+            and not needed_in(end.whole, candidate.amplitude_names)
         ]
-        for group in (
-            [idle, *([candidate] for candidate in idle)] if len(idle) > 1 else [idle] if idle else []
-        ):
-            k, names = group[0][0], {candidate.effect.name for _k, candidate in group}
-            later = accepted[k:]
-            self.tell(f"trying without {' and '.join(candidate.title for _k, candidate in group)}")
+        for group in [idle, *([each] for each in idle)] if len(idle) > 1 else [idle] if idle else []:
+            k, gone = group[0][0], [candidate for _k, candidate in group]
+            self.tell(f"trying without {' and '.join(candidate.title for candidate in gone)}")
+            later = path.steps[k:]
+            names = [c.effect.name for c in gone]
             kept = [c for s in later for c in s.candidates if c.effect.name not in names]
-            values = [states[-1].part.parameters[name] for c in kept for name in c.amplitude_names]
-            from_there = started_at(states[k].part, states[-1].part)
-            trial = of_library(from_there, kept, values)
-            replacement = self.tests.best(states[k], fitted_ones([trial]), rounds[k])
-            if replacement is None:
-                continue
-            replacement = replacement[0], self._released(replacement[1])
-            if not self._likelier(replacement, later, states[-1]):
-                continue
-            kept_names = {c.effect.name for c in kept}
-            others = [a for s in later for a in s.alternatives if a.instead_of in kept_names]
-            accepted[k:] = [replace(replacement[0], alternatives=others)]
-            states[k + 1 :], rounds[k + 1 :] = [replacement[1]], []
-            return
+            values = [end.part.parameters[name] for c in kept for name in c.amplitude_names]
+            trial = of_library(started_at(path.states[k].part, end.part), kept, values)
+            if self._replaced(path, k, fitted_ones([trial])):
+                kept_names = {c.effect.name for c in kept}
+                others = [a for s in later for a in s.alternatives if a.instead_of in kept_names]
+                path.steps[k] = replace(path.steps[k], alternatives=others)
+                return
+
+    def _replaced(
+        self, path: SearchPath, k: int, trials: list[TrialFit], reestimate_noise: bool = False
+    ) -> bool:
+        """Put the best trial in the place of all steps from a number on; return True if that is better."""
+        replacement = self.tests.best(path.states[k], trials, path.rounds[k])
+        if replacement is None:
+            return False
+        step, state = replacement[0], self._released(replacement[1], reestimate_noise)
+        try:
+            evidence = self.tests.log_evidence(state.whole, [step])
+            if not evidence > self.tests.log_evidence(path.states[-1].whole, path.steps[k:]):
+                return False
+        except FitError:
+            return False
+        path.steps[k:], path.states[k + 1 :], path.rounds[k + 1 :] = [step], [state], []
+        return True

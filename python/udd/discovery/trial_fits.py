@@ -119,19 +119,13 @@ def of_library(
     return trial if trial.physical and fitted.converged else None
 
 
-def from_none(current: Fit, candidates: list[Candidate], goal: Goal | None = None) -> TrialFit | None:
-    """Fit effects of the library with free amplitudes that start at zero."""
-    return of_library(current, candidates, [0.0] * sum(len(c.amplitude_names) for c in candidates), goal)
-
-
-def with_more(
-    current: Fit, first: TrialFit, candidates: list[Candidate], goal: Goal | None = None
+def of_several(
+    current: Fit, candidates: list[Candidate], goal: Goal | None = None, first: TrialFit | None = None
 ) -> TrialFit | None:
-    """Fit effects of the library, one of which was fitted already, from where that fit ended."""
-    start = started_at(current, first.fit)
-    values = first.fit.parameters
+    """Fit several effects of the library, from zero or from the end of a fit that has one of them."""
+    values = first.fit.parameters if first else {}
     amplitudes = [values.get(name, 0.0) for c in candidates for name in c.amplitude_names]
-    return of_library(start, candidates, amplitudes, goal)
+    return of_library(started_at(current, first.fit) if first else current, candidates, amplitudes, goal)
 
 
 def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | None:

@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 from udd._util import value_text
 from udd._util.small_units import small_unit
 from udd.discovery.thresholds import SAME as IDENTICAL
-from udd.discovery.validation.held_out_errors import reaches_noise_floor as floor_reached
+from udd.discovery.validation.held_out_errors import reaches_noise_floor
 from udd.effects.user_defined import is_spline as is_spline
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def _verdict(discovery: Discovery) -> str:
         return "The model lacks something, but the search has not yet found what."
     if not discovery.effects and discovery.verdict != "nothing missing":
         return "The model lacks something, but no effect of the library explains what."
-    if discovery.verdict == "nothing missing" and not reaches_noise_floor(discovery):
+    if discovery.verdict == "nothing missing" and not reaches_noise_floor(discovery.error_before):
         return (
             "No effect of the library is clearly missing; yet the known model does not explain "
             "this motion down to the noise of the measurement."
@@ -156,12 +156,6 @@ def rejected(discovery: Discovery) -> list[str]:
         f"ratio {ratio} ({interval}), but {why}."
         for (span, before, after, ratio, interval, why), names in groups.items()
     ]
-
-
-def reaches_noise_floor(discovery: Discovery) -> bool:
-    """Return True if the known model's held-out error is at most 1.5 times the noise floor."""
-    e = discovery.error_before
-    return floor_reached(e, discovery.horizon if discovery.horizon is not None else e.horizons[-1])
 
 
 def _meanings(added: AddedEffect, discovery: Discovery) -> list[str]:

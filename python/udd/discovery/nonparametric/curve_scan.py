@@ -271,16 +271,7 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     (score,) = score_splines(flow, [curve.slot], curve.coordinates, curve.splines)
     smoothed = smooth(score, curve.roughness, fit.observations, at)
     moved = replace(score, gradient=score.gradient + score.information @ at)
-    return replace(
-        curve,
-        coefficients=smoothed.coefficients,
-        covariance=smoothed.covariance,
-        precision=smoothed.precision,
-        df=smoothed.df,
-        evidence=smoothed.evidence,
-        score=moved,
-        absorbed=None,
-    )
+    return replace(curve, **vars(smoothed), score=moved, absorbed=None)
 
 
 def _sensible(slot: Slot, coords: tuple[Coordinate, ...]) -> bool:
@@ -319,14 +310,10 @@ def _curve(
         slot,
         coords,
         splines,
-        smoothed.coefficients,
-        smoothed.covariance,
-        smoothed.precision,
-        smoothed.df,
-        smoothed.evidence,
-        p,
-        fall,
-        number,
-        tuple(moved.along(c)[moved.linked, 0] for c in coords),
-        score,
+        **vars(smoothed),
+        p=p,
+        chi2=fall,
+        directions=number,
+        places=tuple(moved.along(c)[moved.linked, 0] for c in coords),
+        score=score,
     )

@@ -14,6 +14,8 @@ from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
+from .friction_terms import load_frictions, one_way
+from .term_library import delays, dry, terms, thresholds
 
 
 def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
@@ -40,14 +42,11 @@ def library(
     friction that depends on the direction, for other models. `given` candidates come first. Terms that the
     free parameters absorb are not removed here, because that depends on the data.
     """
-    from .friction_terms import load_frictions, one_way
-
     there = {effect.name for effect in model.effects}
     if isinstance(model, FormulaModel):
-        from .term_library import delays, dry, terms, thresholds
-
-        turning = [] if states is None else [*dry(model, states), *thresholds(model, states)]
-        turning += [] if states is None else load_frictions(model, states)
+        turning: list[Candidate] = []
+        if states is not None:
+            turning = [*dry(model, states), *thresholds(model, states), *load_frictions(model, states)]
         listed = [c for c in (*given, *terms(model), *delays(model), *turning) if c.effect.name not in there]
         return list({(c.effect.name, c.effect.values): c for c in listed}.values())
     result = []

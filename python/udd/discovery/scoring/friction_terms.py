@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from udd.effects.user_defined import FormulaSpec, written
 from udd.models.formula_model import FormulaModel
 
 from .candidate import ONE_WAY, Candidate
-from .term_library import unused_names, word_for
+from .written_laws import BRAKES, EITHER, Shape, laws
 
 Array = NDArray[np.float64]
 
@@ -26,7 +25,10 @@ _ANGLES = (0.1, 0.3, 0.8)  # the same of an angle, rad
 _SPEEDS = 9  # parts of the range of speeds; drag may begin in the middle of each
 _ROUND = 1e-3  # share of a speed's root mean square within which corners are rounded off
 _TURNS = 0.03  # the same for the sign of dry friction under load
-_BRAKE, _EITHER = (-np.inf, 0.0), (-np.inf, np.inf)
+# Shapes that may have any value, of which scores choose one: a power or a time, and a place or a speed. The
+# width at a place is a shape, and the prior of the place has the same width.
+_FREE = (0.5, 1.5)
+_SIZE, _PLACE, _WIDTH = Shape("scanned", _FREE), Shape("scanned", _FREE, EITHER), Shape("shape", _FREE)
 
 
 def places(visited: Array, width: float, *, angle: bool = False) -> list[float]:
@@ -94,8 +96,8 @@ def load_frictions(model: FormulaModel, states: Array) -> list[Candidate]:
     for joint in _joints(model, states):
         if joint.angle:
             text = f"({{c}}*cos({joint.x}) + {{d}}*{joint.v}^2)*tanh({joint.v}/{_TURNS * joint.typical:.3g})"
-            limits = {"c": _BRAKE, "d": _BRAKE}
-            result += _listed(model, joint, "dry friction growing with the load", text, limits, [{}])
+            title = f"dry friction growing with the load in {joint.slot}"
+            result += laws(model, joint.slot, text, title, {"c": BRAKES, "d": BRAKES})
     return result
 
 
@@ -117,27 +119,28 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
     """
     result = []
     for joint in _joints(model, states):
-        x, v = joint.x, joint.v
+        x, v, slot = joint.x, joint.v, joint.slot
         small = f"{(_ROUND * joint.typical) ** 2:.3g}"
         power = f"{{c}}*({v}^2 + {small})^({{n}}/2)*{v}"
-        tried = [{"n": value} for value in POWERS]
-        result.append(_listed(model, joint, "power of the speed", power, {"c": _BRAKE}, tried))
-        settling, times = f"{{c}}*exp(-t/{{tau}})*{v}", [{"tau": share * duration} for share in DURATIONS]
-        title = "friction that settles with time"
-        result.append(_listed(model, joint, title, settling, {"c": _EITHER}, times))
+        title, tried = f"power of the speed in {slot}", [(value,) for value in POWERS]
+        result.append(laws(model, slot, power, title, {"c": BRAKES}, {"n": _SIZE}, tried))
+        settling, times = f"{{c}}*exp(-t/{{tau}})*{v}", [(share * duration,) for share in DURATIONS]
+        title = f"friction that settles with time in {slot}"
+        result.append(laws(model, slot, settling, title, {"c": EITHER}, {"tau": _SIZE}, times))
         away = f"2*sin(({x} - {{b}})/2)" if joint.angle else f"{x} - {{b}}"
         local, span = f"{{c}}*exp(-(({away})/{{s}})^2)*{v}", float(np.ptp(joint.places))
         span = min(span, 2 * np.pi) if joint.angle else span
-        tried = [
-            {"b": place, "s": share * span}
+        where = [
+            (place, share * span)
             for share in _WIDTHS
             for place in places(joint.places, share * span, angle=joint.angle)
         ]
-        result.append(_listed(model, joint, f"friction near a place of {x}", local, {"c": _BRAKE}, tried))
+        title = f"friction near a place of {x} in {slot}"
+        result.append(laws(model, slot, local, title, {"c": BRAKES}, {"b": _PLACE, "s": _WIDTH}, where))
         above = f"(abs({v}) - {{b}})"
         beyond = f"{{c}}*({above} + sqrt({above}^2 + {small}))/2*{v}"
-        tried = [{"b": speed} for speed in speeds(joint.speeds)]
-        result.append(_listed(model, joint, "drag above a speed", beyond, {"c": _BRAKE}, tried))
+        title, tried = f"drag above a speed in {slot}", [(speed,) for speed in speeds(joint.speeds)]
+        result.append(laws(model, slot, beyond, title, {"c": BRAKES}, {"b": _PLACE}, tried))
     return [listed for listed in result if listed]
 
 
@@ -170,37 +173,3 @@ def further() -> tuple[FormulaSpec, ...]:
         replace(local, parameters=(a, place, replace(s, role="shape", grid=_ANGLES))),
         replace(bounded, parameters=(most, replace(b, role="scanned", along="speed"))),
     )
-
-
-def _listed(
-    model: FormulaModel,
-    joint: Joint,
-    kind: str,
-    text: str,
-    limits: dict[str, tuple[float, float]],
-    tried: Sequence[dict[str, float]],
-) -> list[Candidate]:
-    """List a law in a joint with each value of its shapes; braces in its text are parameters."""
-    if not tried:
-        return []
-    title, shapes = f"{kind} in {joint.slot}", list(tried[0])
-    names = unused_names(model, *limits, *shapes)
-    called = dict(zip((*limits, *shapes), names, strict=True))
-    linear = [called[name] for name in limits]
-    ranges = {called[name]: limits[name] for name in limits}
-    ranges |= {called[name]: (0.0, np.inf) for name in shapes if name != "b"}
-    spec = written(joint.slot, text.format(**called), word_for(title), title, linear, ranges, tuple(names))
-    first = called[shapes[0]] if shapes else ""
-    # The width at a place is a shape, and the prior of the place has the same width.
-    listed = (
-        p if p.role == "amplitude" else replace(p, role="scanned" if p.name == first else "shape", grid=_FREE)
-        for p in spec.parameters
-    )
-    spec = replace(spec, parameters=tuple(listed))
-    zero = (0.0,) * len(linear)
-    return [
-        Candidate(effects.Effect(spec.name, (*zero, *values.values()), made=spec), title) for values in tried
-    ]
-
-
-_FREE = (0.5, 1.5)  # grid of a shape that may have any value

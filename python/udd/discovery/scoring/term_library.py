@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import reduce
@@ -14,12 +13,13 @@ from numpy.typing import NDArray
 
 from udd import effects
 from udd._util.expressions import Expression, text_of
-from udd.effects.user_defined import along_of, written
+from udd.effects.user_defined import along_of
 from udd.errors import ModelError
 from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
 from .coordinates import slots
+from .written_laws import BRAKES, DRIVES, EITHER, Range, Shape, laws, unused_names, word_for
 
 _DEGREE = 3
 #: Maximum of states and inputs for products of the third degree: 4 have 35 for each equation, 12 would have
@@ -67,14 +67,12 @@ def terms(model: FormulaModel) -> list[Candidate]:
 def delays(model: FormulaModel) -> list[Candidate]:
     """List the delay of every measured input without one; a negative delay is one of the observation."""
     late = model.late
-    (tau,) = unused_names(model, "tau")
-    result = []
-    for name in model.inputs:
-        if name not in late:
-            title = f"delay of {name}"
-            spec = written(f"delay({name})", tau, word_for(title), title, [tau], None, (tau,))
-            result.append(Candidate(effects.Effect(spec.name, (0.0,), made=spec), title))
-    return result
+    return [
+        candidate
+        for name in model.inputs
+        if name not in late
+        for candidate in laws(model, f"delay({name})", "{tau}", f"delay of {name}", {"tau": EITHER})
+    ]
 
 
 def _ways(model: FormulaModel) -> list[str]:
@@ -102,26 +100,21 @@ def _own_forces(model: FormulaModel, x: str) -> set[str]:
 def _machines(model: FormulaModel, along: str) -> list[Candidate]:
     """List forces that machines have, except dry friction, along a coordinate or between two."""
     v, where = _along(model, along)
-    (c,) = unused_names(model, "c")
-    brake, either = (0.0, np.inf), (-np.inf, np.inf)
     listed = [
-        ("viscous friction", f"-{c}*{v}", brake),
-        ("quadratic drag", f"-{c}*abs({v.strip('()')})*{v}", brake),
-        ("cubic drag", f"-{c}*{v}^3", brake),
+        ("viscous friction", f"-{{c}}*{v}", DRIVES),
+        ("quadratic drag", f"-{{c}}*abs({v.strip('()')})*{v}", DRIVES),
+        ("cubic drag", f"-{{c}}*{v}^3", DRIVES),
     ]
     if along.split(" - ")[0] in model.angles:
-        listed += [(f"{wave}({along})", f"{c}*{wave}({along})", either) for wave in ("sin", "cos")]
+        listed += [(f"{wave}({along})", f"{{c}}*{wave}({along})", EITHER) for wave in ("sin", "cos")]
     else:
-        listed += [("spring", f"-{c}*({along})", either), ("cubic spring", f"-{c}*({along})^3", either)]
+        listed += [("spring", f"-{{c}}*({along})", EITHER), ("cubic spring", f"-{{c}}*({along})^3", EITHER)]
     if along in model.speeds:
-        listed.append(("constant force", c, either))
+        listed.append(("constant force", "{c}", EITHER))
     result = []
     for kind, text, limits in listed:
-        title = f"{kind} {where}"
-        name = word_for(title)
-        spec = written(f"force({along})", text, name, title, [c], {c: limits}, (c,))
-        form = kind if limits is brake else ""
-        result.append(Candidate(effects.Effect(name, (0.0,), made=spec), title, form=form))
+        (candidate,) = laws(model, f"force({along})", text, f"{kind} {where}", {"c": limits})
+        result.append(replace(candidate, form=kind if limits is DRIVES else ""))
     return result
 
 
@@ -182,10 +175,10 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
             continue
         for text, said, values in speeds:
             # The friction of another body may drive this one.
-            low_high = (-np.inf, 0.0) if text == state else (-np.inf, np.inf)
+            limits = BRAKES if text == state else EITHER
             name, title = f"dry_{word_for(said)}_in_{state}", f"dry friction of {said} in {state}'"
             inner = text if text.isidentifier() else f"({text})"
-            result += _turning(model, f"{state}'", f"tanh({inner}/{{b}})", name, title, values, low_high)
+            result += _turning(model, f"{state}'", f"tanh({inner}/{{eps}})", name, title, values, limits)
     return result
 
 
@@ -193,11 +186,11 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
 #: input's dead zone reduces its gain within the threshold, its limit beyond it. Written as the other one,
 #: each would need the whole gain as its amplitude, and zero gain in the known model.
 _BEYOND = "(max({x} - {b}, 0) + min({x} + {b}, 0))"
-_SMOOTH = ("saturation", "tanh({x}/{b})", (-np.inf, np.inf))
-_IN_PLACE = (("dead zone", _BEYOND, (-np.inf, np.inf)), _SMOOTH)
+_SMOOTH = ("saturation", "tanh({x}/{b})", EITHER)
+_IN_PLACE = (("dead zone", _BEYOND, EITHER), _SMOOTH)
 _IN_INPUT = (
-    ("dead zone", "min(max({x}, -{b}), {b})", (-np.inf, 0.0)),
-    ("limit", _BEYOND, (-np.inf, 0.0)),
+    ("dead zone", "min(max({x}, -{b}), {b})", BRAKES),
+    ("limit", _BEYOND, BRAKES),
     _SMOOTH,
 )
 
@@ -226,8 +219,7 @@ def thresholds(model: FormulaModel, states: NDArray[np.float64]) -> list[Candida
             for kind, term, limits in _IN_INPUT if x in model.inputs else _IN_PLACE:
                 title = f"{kind} of {x} in {slot}"
                 name = f"{word_for(kind)}_of_{x}_in_{_place(slot)}"
-                made = (model, slot, term.replace("{x}", x), name, title, values, limits)
-                result += _turning(*made, _BOUNDS, "shape")
+                result += _turning(model, slot, term.replace("{x}", x), name, title, values, limits, "b")
     return result
 
 
@@ -237,9 +229,9 @@ def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candid
         v, where = _along(model, along)
         columns = [states[:, model.state_names.index(model.speeds[x])] for x in along.split(" - ")]
         name, title = word_for(f"dry {where}"), f"dry friction {where}"
-        speed = reduce(np.subtract, columns)
-        made = (model, f"force({along})", f"tanh({v}/{{b}})", name, title, speed, (-np.inf, 0.0))
-        result += [replace(c, form="dry") for c in _turning(*made)]
+        speed, term = reduce(np.subtract, columns), f"tanh({v}/{{eps}})"
+        listed = _turning(model, f"force({along})", term, name, title, speed, BRAKES)
+        result += [replace(c, form="dry") for c in listed]
     return result
 
 
@@ -260,21 +252,17 @@ def _turning(
     name: str,
     title: str,
     argument: NDArray[np.float64],
-    limits: tuple[float, float],
-    widths: tuple[float, ...] = _WIDTHS,
-    role: str = "width",
+    limits: Range,
+    bound: str = "eps",
 ) -> list[Candidate]:
-    """List a term that turns over within a width ``{b}``, for each width in units of its argument's size."""
+    """List a term that turns over at widths ``{eps}`` or bounds ``{b}``, shares of its argument's size."""
     typical = _typical(argument)
     if not typical > 0.0:
         return []
-    c, b = unused_names(model, "c", "eps" if role == "width" else "b")
-    ranges = {c: limits, b: (0.0, np.inf)}
-    spec = written(slot, f"{c}*{term.replace('{b}', b)}", name, title, [c], ranges, (c, b))
-    values = tuple(w * typical for w in widths)
-    listed = tuple(replace(p, role=role, grid=values) if p.name == b else p for p in spec.parameters)
-    spec = replace(spec, parameters=listed)
-    return [Candidate(effects.Effect(name, (0.0, value), made=spec), title) for value in values]
+    role, shares = ("width", _WIDTHS) if bound == "eps" else ("shape", _BOUNDS)
+    values = tuple(share * typical for share in shares)
+    shapes = {bound: Shape(role, values)}
+    return laws(model, slot, f"{{c}}*{term}", title, {"c": limits}, shapes, [(v,) for v in values], name)
 
 
 def given_terms(model: FormulaModel, given: Iterable[tuple[str, Expression]]) -> list[Candidate]:
@@ -315,31 +303,22 @@ def _candidate(model: FormulaModel, slot: str, text: str, name: str, said: str) 
 
 def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
     """List a wave of each frequency in each equation that is not just the rate of another state."""
-    a, b, f = unused_names(model, "a", "b", "f")
-    text = f"{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
+    text = "{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
+    # The fit may move it within its line.
+    amplitudes, shapes = {"a": EITHER, "b": EITHER}, {"f": Shape("frequency", (), EITHER)}
+    tried = [(float(f),) for f in frequencies]
     result = []
     for slot in slots(model):
-        spec = written(slot.name, text, f"wave_in_{_place(slot.name)}", None, [a, b], None, (a, b, f))
-        # The fit may move it within its line.
-        listed = tuple(replace(p, role="frequency") if p.name == f else p for p in spec.parameters)
-        spec = replace(spec, title=f"a wave in {slot.name}", parameters=listed)
-        for value in frequencies:
-            effect = effects.Effect(spec.name, (0.0, 0.0, float(value)), made=spec)
-            result.append(Candidate(effect, f"a wave of frequency {value:.4g} in {slot.name}"))
+        name, title = f"wave_in_{_place(slot.name)}", f"a wave in {slot.name}"
+        for wave in laws(model, slot.name, text, title, amplitudes, shapes, tried, name):
+            frequency = wave.effect.values[-1]
+            result.append(replace(wave, title=f"a wave of frequency {frequency:.4g} in {slot.name}"))
     return result
 
 
 def _place(slot: str) -> str:
     """Return a slot as a part of a name."""
     return word_for(slot.removesuffix("'"))
-
-
-def unused_names(model: FormulaModel, *wanted: str) -> list[str]:
-    """Return names for a term's parameters that are unused in the model."""
-    taken = {*model.state_names, *dict(model.values), *model.inputs, "t", "pi"}
-    return [
-        next(n for n in (name, *(f"{name}{k}" for k in range(1, 99))) if n not in taken) for name in wanted
-    ]
 
 
 def _of_states(model: FormulaModel) -> list[str]:
@@ -360,12 +339,3 @@ def _of_states(model: FormulaModel) -> list[str]:
 def _product(names: tuple[str, ...]) -> str:
     counted = {name: names.count(name) for name in names}
     return "*".join(name if k == 1 else f"{name}^{k}" for name, k in counted.items()) or "1"
-
-
-def word_for(text: str) -> str:
-    """Make an identifier that describes a term."""
-    if text == "1":
-        return "constant"
-    said = text.replace("^", "").replace(" - ", "_less_").replace("-", "_less_").replace("/", "_over_")
-    word = re.sub(r"\W+", "_", said).strip("_")
-    return word if word.isidentifier() else f"term_{word}"

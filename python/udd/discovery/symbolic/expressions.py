@@ -8,7 +8,7 @@ text.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -134,14 +134,24 @@ def amplitudes(node: Node) -> set[int]:
     return amplitudes(node[1]) if node[0] == "/" else set()
 
 
+def rewritten(node: Node, rule: Callable[[Node], Node | None]) -> Node:
+    """Replace parts of the formula by what a rule returns for them; if that is None, try their parts."""
+    made = rule(node)
+    if made is not None or node[0] in ("x", "n", "c"):
+        return node if made is None else made
+    return (node[0], *(rewritten(part, rule) for part in node[1:]))
+
+
 def scaled(node: Node, scale: float, values: list[float]) -> Node:
     """Rewrite the formula for ``x / scale``, every scale a constant; new ones are appended to `values`."""
-    if node[0] == "x":
+
+    def multiple(part: Node) -> Node | None:
+        if part != X:
+            return None
         values.append(1.0 / scale)
         return ("*", ("c", len(values) - 1), X)
-    if node[0] in ("n", "c"):
-        return node
-    return (node[0], *(scaled(part, scale, values) for part in node[1:]))
+
+    return rewritten(node, multiple)
 
 
 def sensible(node: Node, angle: bool = False) -> bool:
@@ -168,30 +178,24 @@ def sensible(node: Node, angle: bool = False) -> bool:
 
 def without_sign(node: Node) -> Node:
     """Rewrite the formula for a variable that is never negative."""
-    if node == ("abs", X):
-        return X
-    if node[0] in ("x", "n", "c"):
-        return node
-    return (node[0], *(without_sign(part) for part in node[1:]))
+    return rewritten(node, lambda part: X if part == ("abs", X) else None)
 
 
 def softened(node: Node, width: float) -> Node:
     """Round off broken powers within a width of zero, where their slope is infinite."""
-    if node[0] in ("x", "n", "c"):
-        return node
-    if node[0] == "^" and not (node[2][0] == "n" and float(node[2][1]).is_integer()):
-        base = node[1][1] if node[1][0] == "abs" else node[1]
-        return ("^", ("sqrt", ("+", ("^", softened(base, width), ("n", 2.0)), ("n", width**2))), node[2])
-    return (node[0], *(softened(part, width) for part in node[1:]))
+
+    def soft(part: Node) -> Node | None:
+        if part[0] != "^" or (part[2][0] == "n" and float(part[2][1]).is_integer()):
+            return None
+        base = part[1][1] if part[1][0] == "abs" else part[1]
+        return ("^", ("sqrt", ("+", ("^", softened(base, width), ("n", 2.0)), ("n", width**2))), part[2])
+
+    return rewritten(node, soft)
 
 
 def put(node: Node, number: int, value: float) -> Node:
     """Replace a constant by a literal."""
-    if node[0] == "c":
-        return ("n", value) if node[1] == number else node
-    if node[0] in ("x", "n"):
-        return node
-    return (node[0], *(put(part, number, value) for part in node[1:]))
+    return rewritten(node, lambda part: ("n", value) if part == ("c", number) else None)
 
 
 def simplify(node: Node, values: list[float]) -> Node:
@@ -219,20 +223,14 @@ def _is(node: Node, value: float) -> bool:
 
 def _shorter(kind: str, a: Node, b: Node, values: list[float]) -> Node:
     """Simplify an operation on simple parts."""
-    if kind in "+-" and _is(b, 0.0):
+    if (kind in "+-" and _is(b, 0.0)) or (kind in "*/^" and _is(b, 1.0)):
         return a
-    if kind == "+" and _is(a, 0.0):
+    if (kind == "+" and _is(a, 0.0)) or (kind == "*" and _is(a, 1.0)):
         return b
-    if kind == "*" and (_is(a, 0.0) or _is(b, 0.0)):
+    if (kind in "*/" and _is(a, 0.0)) or (kind == "*" and _is(b, 0.0)):
         return ("n", 0.0)
-    if kind == "*" and _is(a, 1.0):
-        return b
-    if kind in "*/^" and _is(b, 1.0):
-        return a
     if kind == "^" and _is(b, 0.0):
         return ("n", 1.0)
-    if kind == "/" and _is(a, 0.0):
-        return ("n", 0.0)
     if kind == a[0] == "^" and all(part[0] == "n" and float(part[1]).is_integer() for part in (a[2], b)):
         return ("^", a[1], ("n", a[2][1] * b[1]))
     number = ("n", "c")
@@ -294,12 +292,12 @@ def shape(node: Node) -> str:
     return write(node, "x", dict.fromkeys(constants(node), "c"))
 
 
-def write(node: Node, variable: str, names: dict[int, str]) -> str:
+def write(node: Node, variable: str, names: Mapping[int, str]) -> str:
     """Write the formula in the text grammar, its constants by these names."""
     return _text(node, variable, names)[0]
 
 
-def _text(node: Node, variable: str, names: dict[int, str]) -> tuple[str, int]:
+def _text(node: Node, variable: str, names: Mapping[int, str]) -> tuple[str, int]:
     """Write text and return its operator precedence."""
     kind = node[0]
     if kind == "x":

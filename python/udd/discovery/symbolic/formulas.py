@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from .expressions import (
     evaluate,
     exponents,
     put,
+    rewritten,
     sensible,
     shape,
     simplify,
@@ -115,8 +116,7 @@ def formulas_for(
     least = _SHARE * curve.evidence - _FAR
     shortlist = [candidate for candidate in _different(trials, target.x) if candidate.nats > least][:_MOST]
     ranked = _different([target.shorten(candidate) for candidate in shortlist], target.x)
-    free = [name for name in _NAMES if name not in taken]
-    formulas = [_formula(curve, candidate, free) for candidate in ranked]
+    formulas = [_formula(curve, candidate, taken) for candidate in ranked]
     best = max((candidate.nats for candidate in formulas), default=-math.inf)
     return [candidate for candidate in formulas if candidate.nats > best - EVIDENCE_MARGIN]
 
@@ -141,9 +141,7 @@ def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> F
         if fitted is not None:
             trials.append(fitted)
     best = max(trials, key=lambda candidate: candidate.nats, default=None)
-    if best is None:
-        return None
-    return _formula(curve, best, [name for name in _NAMES if name not in taken])
+    return None if best is None else _formula(curve, best, taken)
 
 
 def without(formula: Formula, name: str) -> Formula | None:
@@ -153,24 +151,10 @@ def without(formula: Formula, name: str) -> Formula | None:
     if name not in formula.amplitudes:
         return None
     node = simplify(put(formula.node, names.index(name), 0.0), values)
-    remaining = [names[k] for k in constants(node) if k < len(names)]
-    if not remaining or len(remaining) != len(constants(node)) or not amplitudes(node):
+    # Merged constants have no name.
+    if not amplitudes(node) or max(constants(node)) >= len(names):
         return None
-    order = {names.index(kept_name): k for k, kept_name in enumerate(remaining)}
-    shorter = _renumbered(node, order)
-    linear = tuple(
-        kept_name for kept_name in remaining if order[names.index(kept_name)] in amplitudes(shorter)
-    )
-    variable = formula.variable
-    text = write(shorter, variable, dict(enumerate(remaining)))
-    return Formula(
-        text,
-        {kept_name: formula.parameters[kept_name] for kept_name in remaining},
-        linear,
-        formula.nats,
-        shorter,
-        variable,
-    )
+    return _called(dict(enumerate(names)), node, values, formula.nats, formula.variable)
 
 
 @dataclass(frozen=True)
@@ -270,39 +254,43 @@ class _Target:
 
     def shorten(self, fitted: _Fitted) -> _Fitted:
         """Remove constants one by one while that pays."""
-        improved = True
-        while improved:
-            improved = False
-            for number in constants(fitted.node):
-                for value in _EXPONENTS if number in exponents(fitted.node) else (0.0, 1.0):
-                    values = list(fitted.values)
-                    node = simplify(put(fitted.node, number, value), values)
-                    trial = self.fit(node, values) if self.takes(node) else None
-                    # A factor has a unit: it may become 1 only if another one replaces it.
-                    least = self.cost - 0.1 if value == 1.0 and number not in exponents(fitted.node) else 0.0
-                    if trial is not None and trial.nats > fitted.nats + least:
-                        fitted, improved = trial, True
-                        break
-                if improved:
-                    break
+        while shorter := next(self._shorter(fitted), None):
+            fitted = shorter
         return fitted
 
+    def _shorter(self, fitted: _Fitted) -> Iterator[_Fitted]:
+        """Yield more probable formulas with one constant fewer."""
+        powers = exponents(fitted.node)
+        for number in constants(fitted.node):
+            for value in _EXPONENTS if number in powers else (0.0, 1.0):
+                values = list(fitted.values)
+                node = simplify(put(fitted.node, number, value), values)
+                trial = self.fit(node, values) if self.takes(node) else None
+                # A factor has a unit: it may become 1 only if another one replaces it.
+                least = self.cost - 0.1 if value == 1.0 and number not in powers else 0.0
+                if trial is not None and trial.nats > fitted.nats + least:
+                    yield trial
 
-def _formula(curve: Curve, fitted: _Fitted, free: Sequence[str]) -> Formula:
-    numbers = constants(fitted.node)
-    order = {number: k for k, number in enumerate(numbers)}
-    names = {number: free[k] for number, k in order.items()}
-    coord = curve.coordinates[0]
-    text = write(fitted.node, coord.text, names)
-    parameters = {names[number]: fitted.values[number] for number in numbers}
-    linear = tuple(names[number] for number in numbers if number in amplitudes(fitted.node))
-    nats = fitted.nats - curve.evidence
-    return Formula(text, parameters, linear, nats, _renumbered(fitted.node, order), coord.text)
+
+def _formula(curve: Curve, fitted: _Fitted, taken: Collection[str]) -> Formula:
+    """Name the constants of a formula for a curve."""
+    unused = (name for name in _NAMES if name not in taken)
+    names = dict(zip(constants(fitted.node), unused, strict=False))
+    variable = curve.coordinates[0].text
+    return _called(names, fitted.node, fitted.values, fitted.nats - curve.evidence, variable)
 
 
-def _renumbered(node: Node, order: dict[int, int]) -> Node:
-    if node[0] == "c":
-        return ("c", order[node[1]])
-    if node[0] in ("x", "n"):
-        return node
-    return (node[0], *(_renumbered(part, order) for part in node[1:]))
+def _called(
+    names: Mapping[int, str], node: Node, values: Sequence[float], nats: float, variable: str
+) -> Formula:
+    """Make a formula whose constants have these names, and are numbered in order of appearance."""
+    numbers = constants(node)
+    order = {number: ("c", k) for k, number in enumerate(numbers)}
+    return Formula(
+        text=write(node, variable, names),
+        parameters={names[number]: values[number] for number in numbers},
+        amplitudes=tuple(names[number] for number in numbers if number in amplitudes(node)),
+        nats=nats,
+        node=rewritten(node, lambda part: order[part[1]] if part[0] == "c" else None),
+        variable=variable,
+    )

@@ -80,6 +80,18 @@ class Errors:
         return f"<Errors of {len(self.samples)} free runs: median {each or 'none'}>"
 
     @property
+    def horizon(self) -> float | None:
+        """Horizon at which models are compared, s: for the disk 1 s, or the longest below.
+
+        For a user's own model it is the third horizon. For a pendulum it is None, the whole run.
+        """
+        if self.unit == "rad":
+            return None
+        if self.unit == "spread":
+            return self.horizons[:3][-1]
+        return max((h for h in self.horizons if h <= 1.0), default=self.horizons[0])
+
+    @property
     def whole(self) -> float:
         """Root mean square error of the free run over all held-out frames."""
         return float(_rms(self.run))
@@ -99,9 +111,7 @@ class Errors:
         return {"unit": self.unit, "starts": len(self.samples), "errors": rows, "whole_run_rms": self.whole}
 
 
-def held_out_errors(
-    fit: Fit, record: Record, held_out: NDArray[np.bool_], seed: int = 0, unit: float = 1.0
-) -> Errors:
+def held_out_errors(fit: Fit, record: Record, held_out: NDArray[np.bool_], unit: float = 1.0) -> Errors:
     """Compute the errors of a fitted model on the held-out frames of `record`.
 
     Each free run starts from a state that is filtered from the second of data before it; time stays absolute.
@@ -124,14 +134,10 @@ def held_out_errors(
     firsts, states = _filtered(fit, record, windows)
     starts = windows[:, 1]
     times = record.t[ends]
-    seen = np.where(record.observed[ends], record.seen[ends], np.nan)
-    there = _comparable(fit, record)[ends]
     predictions = predicted(fit.models, fit.point.sets, record.film[starts], record.t[starts], states, times)
-    samples = np.where(there, _distance(fit, record, predictions, seen), np.nan)
-
-    floor = _floor(fit, record, windows, ends, firsts, seed)
-    rng = np.random.default_rng(seed)
-
+    samples = _distance(fit, record, ends, predictions, _observed(record, ends))
+    floor = _floor(fit, record, windows, ends, firsts)
+    rng = np.random.default_rng(0)
     blocks = _blocks(record, starts, _BLOCK * unit)
     low, high = np.array([_interval(blocks, column[:, None], _median, rng) for column in samples.T]).T
     return Errors(
@@ -171,36 +177,25 @@ def _held_out_of(record: Record, held_out: NDArray[np.bool_]) -> list[NDArray[np
     return [frames_of_film for frames_of_film in frames if len(frames_of_film)]
 
 
-def comparison_horizon(errors: Errors) -> float:
-    """Return the horizon at which models are compared, s: for the disk 1 s, or the longest below.
+def improvement(before: Errors, after: Errors, horizon: float | None) -> Ratio:
+    """Compute the ratio of the errors, after over before, with its 95 % interval.
 
-    For a user's own model it is the third horizon.
+    They are the median errors at a horizon; without one, those of the run over all held-out frames.
     """
-    if errors.unit == "spread":
-        return errors.horizons[:3][-1]
-    return max((h for h in errors.horizons if h <= 1.0), default=errors.horizons[0])
-
-
-def improvement(before: Errors, after: Errors, horizon: float, seed: int = 0) -> Ratio:
-    """Compute the ratio of the median errors at a horizon, after over before, with its 95 % interval."""
+    if horizon is None:
+        return _ratio(before.run_blocks, np.column_stack([after.run, before.run]), _rms)
     k = before.horizons.index(horizon)
-    samples = np.column_stack([after.samples[:, k], before.samples[:, k]])
-    return _ratio(before.blocks, samples, _median, seed)
+    return _ratio(before.blocks, np.column_stack([after.samples[:, k], before.samples[:, k]]), _median)
 
 
-def whole_improvement(before: Errors, after: Errors, seed: int = 0) -> Ratio:
-    """Compute the ratio of the errors of the free run over all held-out frames, with its 95 % interval."""
-    return _ratio(before.run_blocks, np.column_stack([after.run, before.run]), _rms, seed)
-
-
-def cost_improvement(before: Array, after: Array, record: Record, seed: int = 0, unit: float = 1.0) -> Ratio:
+def cost_improvement(before: Array, after: Array, record: Record, unit: float) -> Ratio:
     """Compute the ratio of two fits' costs on a held-out record, with its 95 % interval from paired blocks.
 
     The costs are those of :attr:`udd.Fit.frame_costs`. They distinguish two models even if their
     forecasts are equally good.
     """
     costs = np.column_stack([after, before])
-    return _ratio(block_numbers(record, _COST_BLOCK * unit), costs, _sum, seed)
+    return _ratio(block_numbers(record, _COST_BLOCK * unit), costs, _sum)
 
 
 def confirmed(before: Errors, ratio: Ratio) -> bool:
@@ -213,11 +208,12 @@ def confirmed(before: Errors, ratio: Ratio) -> bool:
     _value, low, high = ratio
     if not np.isfinite(high) or low > 1.0:
         return False
-    return high < 1.0 or (before.unit != "rad" and reaches_noise_floor(before, comparison_horizon(before)))
+    return high < 1.0 or (before.horizon is not None and reaches_noise_floor(before))
 
 
-def reaches_noise_floor(errors: Errors, horizon: float) -> bool:
+def reaches_noise_floor(errors: Errors) -> bool:
     """Return True if errors are within a factor 1.5 of the noise floor, or of the integration error."""
+    horizon = errors.horizons[-1] if errors.horizon is None else errors.horizon
     median, low, _high, floor = errors.at(horizon)
     least = _INTEGRATED if errors.unit == "spread" else 0.0
     return bool((low if np.isfinite(low) else median) <= max(_FLOOR * floor, least))
@@ -232,7 +228,7 @@ def lacks_more(fit: Fit, errors: Errors) -> bool:
     if fit.scatter > UNEXPLAINED:
         return True
     written = fit.model.profile.written
-    return written and not reaches_noise_floor(errors, comparison_horizon(errors)) and fit.doubts.missing
+    return written and not reaches_noise_floor(errors) and fit.doubts.missing
 
 
 def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_]) -> bool:
@@ -240,10 +236,10 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
 
     For a pendulum this refers to the whole held-out part, else to the horizon of comparison.
     """
-    if errors.unit == "rad":
+    if errors.horizon is None:
         error, floor = errors.whole, float(errors.floor[-1])
     else:
-        error, _low, _high, floor = errors.at(comparison_horizon(errors))
+        error, _low, _high, floor = errors.at(errors.horizon)
     size = 1.0
     if errors.unit != "spread":
         complete = held_out & record.observed.all(axis=1)
@@ -253,11 +249,11 @@ def misses_the_motion(errors: Errors, record: Record, held_out: NDArray[np.bool_
     return bool(error > _LOST * size and not floor >= 0.5 * _LOST * size)
 
 
-def _ratio(blocks: NDArray[np.int64], columns: Array, measure: Callable[[Array], Array], seed: int) -> Ratio:
+def _ratio(blocks: NDArray[np.int64], columns: Array, measure: Callable[[Array], Array]) -> Ratio:
     def ratio(first: Array, second: Array) -> Array:
         return measure(first) / measure(second)
 
-    return (float(ratio(*columns.T)), *_interval(blocks, columns, ratio, np.random.default_rng(seed)))
+    return (float(ratio(*columns.T)), *_interval(blocks, columns, ratio, np.random.default_rng(0)))
 
 
 def _windows(
@@ -328,24 +324,22 @@ def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_], window: float) -
             frames = frames[frames > at]
         times = record.t[frames][None, :]
         prediction = predicted(fit.models, fit.point.sets, film, record.t[[at]], start, times)[0]
-        errors[frames] = _distance(
-            fit, record, prediction, np.where(record.observed[frames], record.seen[frames], np.nan)
-        )
-    result: Array = np.where(_comparable(fit, record), errors, np.nan)[held_out]
+        errors[frames] = _distance(fit, record, frames, prediction, _observed(record, frames))
+    result: Array = errors[held_out]
     return result
 
 
 def _floor(
-    fit: Fit, record: Record, windows: NDArray[np.int64], ends: NDArray[np.int64], first: Array, seed: int
+    fit: Fit, record: Record, windows: NDArray[np.int64], ends: NDArray[np.int64], first: Array
 ) -> Array:
     """Compute median errors of the same free runs on simulated data with the estimated noise.
 
     ``first`` has the states at the windows' first frames, at which the simulated runs start.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     # All windows have the length of the shortest, because frame rates may differ.
     length = int((windows[:, 1] - windows[:, 0]).min()) + 1
-    n, begins = len(windows), windows[:, 1] - length + 1
+    begins = windows[:, 1] - length + 1
     first = np.where((begins == windows[:, 0])[:, None], first, record.states[begins])
     film = record.film[windows[:, 1]]
     frames = np.hstack([begins[:, None] + np.arange(length), ends])
@@ -363,23 +357,14 @@ def _floor(
     # Windows overlap: each gets separate frames, not linked to the others.
     inside = frames[:, :length].ravel()
     simulated = replace(
-        record,
-        t=record.t[inside],
+        record.part(inside),
         seen=made[:, :length].reshape(n * length, -1),
-        sigma=record.sigma[inside],
-        rho=record.rho[inside],
         linked=np.tile(np.arange(length) < length - 1, n)[:-1],
-        states=record.states[inside],
-        odd=record.odd[inside],
-        row=record.row[inside],
-        film=record.film[inside],
     )
     starts = length * np.arange(n)
     _first, last = _filtered(fit, simulated, np.column_stack([starts, starts + length - 1]))
     runs = predicted(fit.models, fit.point.sets, film, record.t[windows[:, 1]], last, record.t[ends])
-    there = _comparable(fit, record)[ends]
-    errors = np.where(there, _distance(fit, record, runs, made[:, length:]), np.nan)
-    result: Array = np.nanmedian(errors, axis=0)
+    result: Array = np.nanmedian(_distance(fit, record, ends, runs, made[:, length:]), axis=0)
     return result
 
 
@@ -399,37 +384,37 @@ def _shown(fit: Fit, record: Record) -> Array | float:
     return result
 
 
-def _comparable(fit: Fit, record: Record) -> NDArray[np.bool_]:
-    """Return the frames in which motions can be compared, (n,); for a user's model one sensor is enough."""
-    seen = record.observed[:, record.observed.any(axis=0)]
-    result: NDArray[np.bool_] = np.asarray(
-        seen.any(axis=1) if fit.model.profile.written else seen.all(axis=1)
-    )
+def _observed(record: Record, frames: NDArray[np.int64]) -> Array:
+    """Return the observations of frames; NaN if there is none."""
+    result: Array = np.where(record.observed[frames], record.seen[frames], np.nan)
     return result
 
 
-def _distance(fit: Fit, record: Record, a: Array, b: Array) -> Array:
+def _distance(fit: Fit, record: Record, frames: NDArray[np.int64], run: Array, seen: Array) -> Array:
     """Compute the distance of disk centres, of pendulum angles, or of states in units of their spread.
 
-    `a` is the run; after it diverged the distance is large.
+    After a run diverged the distance is large. It is NaN in frames without all sensors; for a user's model
+    one sensor is enough.
     """
-    difference = a - b
-    result: Array
-    sensor = fit.model.profile.sensor
+    difference, sensor = run - seen, fit.model.profile.sensor
+    used = np.flatnonzero(record.observed.any(axis=0))
     if sensor.compared:
         if sensor.error_unit == "rad":
             difference = wrapped(difference)
-        result = np.abs(reduce(np.hypot, np.moveaxis(difference[..., : sensor.compared], -1, 0)))
-        return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
-    squares = []
-    for k in np.flatnonzero(record.observed.any(axis=0)):
-        spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
-        angle = isinstance(fit.model, FormulaModel) and fit.channels[k] in fit.model.turning
-        error = wrapped(difference[..., k]) if angle else difference[..., k]
-        squares.append((error / (min(spread, 1.0) if angle else spread)) ** 2)
-    count = np.count_nonzero(np.isfinite(squares), axis=0)
-    result = np.sqrt(np.nansum(squares, axis=0) / np.where(count, count, np.nan))
-    return np.where(np.isnan(a).any(axis=-1), _BLOWN_UP, result)
+        distance = np.abs(reduce(np.hypot, np.moveaxis(difference[..., : sensor.compared], -1, 0)))
+    else:
+        squares = []
+        for k in used:
+            spread = float(record.seen[record.observed[:, k], k].std()) or 1.0
+            angle = isinstance(fit.model, FormulaModel) and fit.channels[k] in fit.model.turning
+            error = wrapped(difference[..., k]) if angle else difference[..., k]
+            squares.append((error / (min(spread, 1.0) if angle else spread)) ** 2)
+        count = np.count_nonzero(np.isfinite(squares), axis=0)
+        distance = np.sqrt(np.nansum(squares, axis=0) / np.where(count, count, np.nan))
+    observed = record.observed[frames][..., used]
+    comparable = observed.any(axis=-1) if fit.model.profile.written else observed.all(axis=-1)
+    result: Array = np.where(comparable, np.where(np.isnan(run).any(axis=-1), _BLOWN_UP, distance), np.nan)
+    return result
 
 
 def _median(rows: Array) -> Array:
