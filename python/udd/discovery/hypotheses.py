@@ -31,15 +31,9 @@ _EQUAL = 1e-2  # relative difference below which two laws are equal
 def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
     """Compute the log evidence by Laplace's approximation, with unit-information priors.
 
-    The states are integrated out, and so are the parameters. A parameter without a prior of its own gets one
-    that carries as much information as one number of the record does (Kass and Wasserman 1995). A model error
-    larger than that of a right model is a random force. It costs ten nats.
-
-    Parameters
-    ----------
-    fitted : Fit
-    names : sequence of str
-        Parameters that the hypothesis adds to the known model, without an explicit prior.
+    The states are integrated out, and so are the parameters. Those that the hypothesis adds, `names`, have a
+    prior that carries as much information as one number of the record does (Kass and Wasserman 1995). A model
+    error larger than that of a right model is a random force. It costs ten nats.
     """
     # Without this cost a cubic drag with a larger model error leads where a power explains more.
     evidence = fitted.evidence - EVIDENCE_MARGIN * (not fitted.problem.has_smallest_model_error)
@@ -120,13 +114,7 @@ def contains(law: Hypothesis, other: Hypothesis, known_parameters: Sequence[str]
     """Return True if one law can imitate another one, along the motion that was fitted with the other.
 
     The law's constants are fitted to the other one's rates by least squares. The part that the known model's
-    parameters absorb is removed.
-
-    Parameters
-    ----------
-    law, other : Hypothesis
-    known_parameters : sequence of str
-        Names of the known model's free parameters.
+    free parameters absorb is removed.
     """
     first = other.whole.record.film == 0
     t, states = other.whole.record.t[first], other.whole.states[first]
@@ -201,19 +189,9 @@ def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[Hypothesis]:
-    """Sort hypotheses, but put the library's law first if it is equivalent to the leading formula.
-
-    Parameters
-    ----------
-    order : sequence of Hypothesis
-        The best first.
-    known_parameters : sequence of str
-        Names of the known model's free parameters.
-    """
-    if not order or order[0].trial.formula is None:
-        return list(order)
-    first = order[0]
-    for other in order[1:]:
+    """Put the library's law before the leading formula of ranked hypotheses if they are equivalent."""
+    first = order[0] if order and order[0].trial.formula else None
+    for other in order[1:] if first else []:
         is_close = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
         if is_close and other.constants <= first.constants and contains(other, first, known_parameters):
             return [other, *(h for h in order if h is not other)]

@@ -19,19 +19,8 @@ def shift_ranges(effect: Effect, final: Fit) -> dict[str, float]:
     """Return the places and phases of an effect, each with the range of its coordinate in the motion.
 
     Such a constant shifts a law along the motion: it is added to a linear function of a place, an angle or
-    the time. A law is no simpler if it is zero, in contrast to an amplitude, a rate or a speed.
-
-    Parameters
-    ----------
-    effect : Effect
-        Effect of the final model.
-    final : Fit
-        Fit of all data, whose motion has the ranges. The range of an angle is at most a turn.
-
-    Returns
-    -------
-    dict of str to float
-        The range for each of these constants.
+    the time. A law is no simpler if it is zero, in contrast to an amplitude, a rate or a speed. The range of
+    an angle is at most a turn.
     """
     result = {p.name: _TURN for p in effect.spec.parameters if p.along == "angle"}
     tree = _tree(getattr(effect.spec, "text", ""))

@@ -56,15 +56,7 @@ def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
 
 
 class Proposals:
-    """Trial fits around a model, from the scores of its missing effects.
-
-    Parameters
-    ----------
-    fit : Fit
-        Fit of the training part of the record.
-    scores : ScoreRound
-    clock : Clock
-    """
+    """Trial fits around a fit of the training part, from the scores of its missing effects."""
 
     def __init__(self, fit: Fit, scores: ScoreRound, clock: Clock) -> None:
         self.fit, self.scores, self.clock = fit, scores, clock

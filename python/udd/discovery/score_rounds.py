@@ -25,16 +25,9 @@ _SCATTER = 3.0  # chi2 per degree of freedom, below which candidates are scored 
 
 @dataclass(frozen=True)
 class ScoreRound:
-    """Scores around one fit.
+    """Scores of the library and of curves around one fit, the most probable curve first.
 
-    Attributes
-    ----------
-    fit : Fit
-    library : Scan
-    curves : list of Curve
-        The most probable first.
-    comparisons : int
-        Count of scores that could have been the best: the number of tests for Bonferroni's correction.
+    `comparisons` is the number of tests for Bonferroni's correction: of scores that could have been the best.
     """
 
     fit: Fit

@@ -12,9 +12,5 @@ ALPHA = 1e-3
 SAME = 1.0 - 1e-6
 #: Test by which data that were not fitted confirm an effect.
 Confirmation = Literal["held", "fitted", "halves"]
-#: Reason for rejection. `chance`: not significant in all data. `part`: not in the training part.
-#: `drift`: a slow drift of the sensor's zero explains more. `held`: the held-out data do not confirm it.
-#: `form`: a form that fits better fails. `unconfirmed`: it passed all tests, but free runs over the held-out
-#: data do not improve significantly. `records`: it is significant in only some of several records, though the
-#: others could show it.
+#: Reason for rejection, see :class:`udd.discovery.RejectedEffect`.
 RejectionReason = Literal["chance", "drift", "part", "held", "form", "unconfirmed", "records"]

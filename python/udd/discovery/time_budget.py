@@ -23,19 +23,9 @@ class TimeUpError(Exception):
 
 
 class Clock:
-    """Time limit of a search, and its current activity.
+    """Time limit of a search, s from now, and its current activity.
 
-    Parameters
-    ----------
-    budget : float or None
-        s from now; None for no limit.
-    tell : callable
-        Called with a short description of each stage.
-
-    Raises
-    ------
-    FitError
-        The budget is not a positive number.
+    `tell` is called with a short description of each stage.
     """
 
     def __init__(self, budget: float | None, tell: Callable[[str], object]) -> None:

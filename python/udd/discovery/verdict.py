@@ -26,17 +26,8 @@ def verdict_of(
 ) -> str:
     """Return the first verdict that holds, from the least to the most certain.
 
-    Parameters
-    ----------
-    added : sequence of AddedEffect
-    unconfirmed : bool
-        True if free runs over the rest do not confirm an effect found in the training part.
-    doubts : sequence of str
-        Reasons against naming the form of the effects, see :func:`doubts_of`.
-    open_form : bool
-        True if another form explains as much, or the remaining or the known model's misfit is not noise.
-    stopped : bool
-        True if the search ran out of time.
+    A form is open if another one explains as much, or if the misfit that remains is not noise. An effect is
+    unconfirmed if it passed in the training part, but free runs over the rest do not confirm it.
     """
     if not added and unconfirmed:
         return "fits the first part, not confirmed"
@@ -50,15 +41,7 @@ def verdict_of(
 def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: int) -> list[str]:
     """List reasons against naming the form of the added effects, in sentences.
 
-    Parameters
-    ----------
-    added : sequence of AddedEffect
-    final : Fit
-        Fit of all data with the effects.
-    ratio : tuple of float
-        Held-out error of free runs after over before, with its interval.
-    held_out : int
-        Count of held-out numbers.
+    `ratio` is the held-out error of free runs after over before; `held_out` counts the held-out numbers.
     """
     result = []
     for effect in added:

@@ -148,14 +148,7 @@ class Curve(OneLine):
 
 @dataclass(frozen=True)
 class CurveScan:
-    """All curves that were tried, the one with the highest evidence first.
-
-    Attributes
-    ----------
-    curves : list of Curve
-    comparisons : int
-        Count of curves that could have been the best.
-    """
+    """Curves that were scored, the one with the highest evidence first, and the count of comparisons."""
 
     curves: list[Curve]
     comparisons: int
@@ -170,17 +163,7 @@ def scan_curves(
 
     The score is computed around the fit, with everything else optimal. Curves are cubic B-splines with a
     prior on their second differences, whose precision is chosen by evidence. Confounding with the free
-    parameters is accounted for.
-
-    Parameters
-    ----------
-    fit : Fit
-    only : callable, optional
-        ``(slot, coordinates) -> bool``: filter of the curves to try.
-
-    Returns
-    -------
-    CurveScan
+    parameters is accounted for. `only` filters the curves to try.
 
     Examples
     --------

@@ -120,16 +120,8 @@ def smooth(score: Score, roughness: Array, observations: int, at: Array | None =
     """Fit the curve under the prior with the highest evidence.
 
     Second differences are normal with a common variance, which the evidence chooses. A constant and a slope
-    each cost a parameter in the Bayesian information criterion.
-
-    Parameters
-    ----------
-    score : Score
-    roughness : ndarray (k, k)
-    observations : int
-        Count of observed numbers in the record.
-    at : ndarray (k,), optional
-        Coefficients of the curve that the scored model already has; default: none.
+    each cost a parameter in the Bayesian information criterion. `at` are the coefficients of the curve that
+    the scored model already has.
     """
     d = directions(score, roughness)
     # The quadratic form is moved to the origin, as if the model had no curve.
@@ -180,19 +172,12 @@ def _typical(information: Array) -> float:
 
 
 def chance(score: Score, roughness: Array) -> tuple[float, float, int]:
-    """Test a penalised curve: the p-value of the largest decrease in chi2 in few smooth directions.
+    """Test a penalised curve by the decrease in chi2 in few smooth directions.
 
-    Without an effect the components of the gradient in the Demmler-Reinsch basis are independent and normal.
-    The decrease in chi2 in the first k directions is then exactly chi2-distributed. A few values of k are
-    tested; the smallest p-value is multiplied by their number (Bonferroni).
-
-    Returns
-    -------
-    p : float
-    fall : float
-        Decrease in chi2 in those directions.
-    number : int
-        Count of directions.
+    Return the p-value, the decrease, and the number of directions. Without an effect the components of the
+    gradient in the Demmler-Reinsch basis are independent and normal. The decrease in chi2 in the first k
+    directions is then exactly chi2-distributed. A few values of k are tested; the smallest p-value is
+    multiplied by their number (Bonferroni).
     """
     d = directions(score, roughness)
     is_seen = d.information > _SEEN

@@ -74,13 +74,7 @@ def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     """List drive ripples at every frequency that a record can resolve.
 
     The frequencies go from two periods in the record to a quarter of the frame rate (6 Hz at most), half a
-    line apart, within the effect's own range.
-
-    Parameters
-    ----------
-    model : Model
-    t : ndarray (n,)
-        Times of the record's frames, s.
+    line apart, within the effect's own range. `t` are the times of the record's frames.
     """
     spec, drive = effects.drive_ripple().spec, model.profile.dynamics.drive
     if model.kind not in spec.bodies or drive is None or model.parameters[drive] == 0:

@@ -61,18 +61,11 @@ def coordinates(model: Model) -> tuple[Coordinate, ...]:
 
 
 def coordinate(model: Model, name: str) -> Coordinate:
-    """Return the coordinate with that name.
-
-    Raises
-    ------
-    FitError
-        The model does not have it.
-    """
-    for candidate in coordinates(model):
-        if candidate.name == name:
-            return candidate
-    names = ", ".join(c.name for c in coordinates(model))
-    raise FitError(f"a curve can be a function of {names}, not of {name!r}")
+    """Return the coordinate with that name."""
+    named = {c.name: c for c in coordinates(model)}
+    if name not in named:
+        raise FitError(f"a curve can be a function of {', '.join(named)}, not of {name!r}")
+    return named[name]
 
 
 def _state(k: int, _t: Array, x: Array) -> Array:

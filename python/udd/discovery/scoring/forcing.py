@@ -110,15 +110,9 @@ def responses(fit: Fit) -> Responses:
 
 
 def score_forcings(fit: Fit, columns: Sequence[Array], parameters_fixed: bool = False) -> list[Score]:
-    """Score groups of columns, each as if it were alone.
+    """Score groups of columns, each as if it were alone, with the free parameters refitted or fixed.
 
-    Parameters
-    ----------
-    fit : Fit
-    columns : sequence of ndarray (n - 1, d, k)
-        Change of the state at every link's end with each amplitude.
-    parameters_fixed : bool
-        True to fix the free parameters instead of refitting them.
+    A group, (n - 1, d, k), is the change of the state at every link's end with each amplitude.
     """
     problem = fit.problem.at(fit.point)
     if parameters_fixed:

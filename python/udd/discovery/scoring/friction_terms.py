@@ -47,18 +47,7 @@ def speeds(visited: Array) -> list[float]:
 
 @dataclass(frozen=True)
 class Joint:
-    """Coordinate of a mechanical model on which friction may act.
-
-    Attributes
-    ----------
-    x, v : str
-        States: the coordinate and its rate.
-    slot : str
-        Place of a force on it in the equations.
-    places, speeds : ndarray (n,)
-        Their values along a motion.
-    angle : bool
-    """
+    """Coordinate x of a mechanical model on which friction may act, its rate v, and both along a motion."""
 
     x: str
     v: str
@@ -86,11 +75,7 @@ def _joints(model: FormulaModel, states: Array) -> list[Joint]:
 def load_frictions(model: FormulaModel, states: Array) -> list[Candidate]:
     """List dry friction in every joint that grows with a pendulum's load (weight and centrifugal force).
 
-    Parameters
-    ----------
-    model : FormulaModel
-    states : ndarray (n, d)
-        A motion, which determines the width of the smoothed sign.
+    A motion, (n, d), determines the width of the smoothed sign.
     """
     result = []
     for joint in _joints(model, states):
@@ -104,18 +89,8 @@ def load_frictions(model: FormulaModel, states: Array) -> list[Candidate]:
 def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[Candidate]]:
     """List frictions of every joint: a power of the speed, above a speed, settling, or near a place.
 
-    Parameters
-    ----------
-    model : FormulaModel
-    states : ndarray (n, d)
-        A motion, which determines the ranges of places and speeds.
-    duration : float
-        Duration of the motion.
-
-    Returns
-    -------
-    list of list of Candidate
-        For each law its candidates, one for each value of the shapes.
+    Each law has one candidate for each value of its shapes. A motion, (n, d), determines the ranges of places
+    and speeds.
     """
     result = []
     for joint in _joints(model, states):

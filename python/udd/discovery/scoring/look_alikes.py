@@ -24,20 +24,8 @@ def look_alikes(base: Model, fitted: Fit, candidates: Iterable[Candidate]) -> li
 
     Around a diverged model the right form may score lower than others, or not at all; next to one that acts
     almost the same it is visible. The part that the model's free parameters absorb is removed from both: with
-    a free gain a dead zone resembles a saturation.
-
-    Parameters
-    ----------
-    known : Model
-        The model without the last effect of the fit.
-    fitted : Fit
-    candidates : iterable of Candidate
-        Candidates with several amplitudes are skipped.
-
-    Returns
-    -------
-    list of (Candidate, float)
-        The look-alikes with their amplitudes, the most similar first.
+    a free gain a dead zone resembles a saturation. Candidates with several amplitudes are skipped. `base` is
+    the model without the last effect of the fit. The most similar candidate comes first, with its amplitude.
     """
     first = fitted.record.film == 0
     t, states = fitted.record.t[first], fitted.states[first]

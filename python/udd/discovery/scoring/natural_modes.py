@@ -24,17 +24,8 @@ _STEP = 1e-5  # relative step of each state in difference quotients
 def modes(model: Model, t: Array, states: Array) -> Array:
     """Compute frequencies of a model's modes, linearised around a motion's mean, and of their spectral lines.
 
-    Parameters
-    ----------
-    model : Model
-    t, states : ndarray (n,), (n, d)
-        Evenly spaced.
-
-    Returns
-    -------
-    ndarray (k,)
-        Cycles per unit of time. A mode whose line in the motion is away from its linear frequency, as for a
-        swing of large amplitude, has both.
+    They are in cycles per unit of time. A mode whose line in the evenly sampled motion is away from its
+    linear frequency, as for a swing of large amplitude, has both.
 
     Examples
     --------
@@ -90,13 +81,7 @@ def belongs(frequencies: Array, fit: Fit) -> NDArray[np.bool_]:
 
 
 def alias(frequency: float, t: Array) -> float:
-    """Return the alias of a frequency in an evenly sampled record.
-
-    Parameters
-    ----------
-    frequency : float
-    t : ndarray (n,)
-        Times, s; for block averages, those of the blocks.
+    """Return the alias of a frequency in an evenly sampled record, or in its block averages.
 
     Examples
     --------

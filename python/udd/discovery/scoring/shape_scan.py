@@ -25,14 +25,10 @@ Array = NDArray[np.float64]
 
 
 def strongest_shapes(fit: Fit) -> tuple[list[Scored], int]:
-    """Score each effect with a scanned number at each of its values.
+    """Score each effect with a scanned number at each of its values; also count the scores.
 
-    Returns
-    -------
-    strongest : list of Scored
-        One for each effect; two if the number is a place, because a pendulum passes either side alike.
-    number : int
-        Count of scores.
+    Return the strongest of each effect; two if the number is a place, because a pendulum passes either side
+    alike.
     """
     moved = responses(fit)
     strongest, number = [], 0

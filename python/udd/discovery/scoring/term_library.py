@@ -147,13 +147,7 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
 
     If an angle's rate is no state, friction of that rate is tried in every equation. With a mass matrix
     friction acts along each coordinate and between two. The sign is smoothed over a width, of which a few are
-    tried.
-
-    Parameters
-    ----------
-    model : FormulaModel
-    states : ndarray (n, d)
-        A motion, which determines the widths.
+    tried, in units of the speeds of a motion, (n, d).
     """
     if model.mass:
         return _dry_forces(model, states)
@@ -266,13 +260,7 @@ def _turning(
 
 
 def given_terms(model: FormulaModel, given: Iterable[tuple[str, Expression]]) -> list[Candidate]:
-    """Make the terms that a user asks for, each an equation's state and a formula.
-
-    Raises
-    ------
-    ModelError
-        A term is not possible in the model.
-    """
+    """Make the terms that a user asks for, each an equation's state and a formula."""
     result = []
     for entry in given:
         if isinstance(entry, str) or not isinstance(entry, (tuple, list)) or len(entry) != 2:

@@ -40,24 +40,10 @@ def laws(
     tried: Iterable[tuple[float, ...]] = ((),),
     name: str = "",
 ) -> list[Candidate]:
-    """Make the candidates of one law, one for each choice of its shapes.
+    """Make the candidates of one law, one for each choice of its shapes' values.
 
-    Parameters
-    ----------
-    model : FormulaModel
-    slot : str
-        Place in the equations, see :func:`udd.effects.formula`.
-    text : str
-        Formula with its parameters in braces; they get names that are unused in the model.
-    title : str
-    amplitudes : mapping of str to (low, high)
-        The amplitudes with their ranges.
-    shapes : mapping of str to Shape, optional
-        The other parameters.
-    tried : iterable of tuple of float
-        Values of the other parameters.
-    name : str
-        Name of the effect; default: made of the title.
+    Parameters in the text are in braces; they get names that are unused in the model. The effect's name is
+    made of the title by default.
     """
     shapes = shapes or {}
     called = dict(zip((*amplitudes, *shapes), unused_names(model, *amplitudes, *shapes), strict=True))

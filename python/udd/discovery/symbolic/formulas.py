@@ -88,22 +88,9 @@ def formulas_for(
     Usual forms (powers, steps, bumps, waves) and those from symbolic regression (pyoperon, if installed) are
     fitted to the curve's coefficients with their full information, which accounts for confounding with the
     free parameters. Each constant has its cost in the Bayesian information criterion, each operation its
-    description length. Needless constants are removed.
-
-    Parameters
-    ----------
-    curve : Curve
-    observations : int
-        Count of observed numbers in the record.
-    seed : int
-        Seed of the regression.
-    taken : collection of str
-        Names that constants may not have: those of a model's states.
-
-    Returns
-    -------
-    list of Formula
-        The most probable first, without those that are less probable by `EVIDENCE_MARGIN`.
+    description length. Needless constants are removed. Constants get none of the names that are `taken`:
+    those of a model's states. The most probable formula comes first; those that are less probable by
+    `EVIDENCE_MARGIN` are dropped.
     """
     target = _Target(curve, observations)
     regressed = regression(curve, _MOST_CONSTANTS, seed)
@@ -125,11 +112,6 @@ def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> F
     """Fit a power with a free exponent to a curve; None if no fit succeeds, or over a periodic angle.
 
     It is the rival of every law that grows with its coordinate.
-
-    Parameters
-    ----------
-    curve, observations, taken
-        As for :func:`formulas_for`.
     """
     if curve.splines[0].periodic:
         return None

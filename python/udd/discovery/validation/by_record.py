@@ -52,22 +52,9 @@ def by_record(
     record could show the effect: at the mean strength in the other records, chance would hide it with a
     probability below 0.1 %.
 
-    Parameters
-    ----------
-    before, after : Fit
-        Fits of the same records, without the added effects and with them.
-    effect : Effect
-        Effect that `after` has and `before` lacks.
-    numbers : sequence of int
-        The user's number of each record.
-
-    Returns
-    -------
-    answers : list of RecordAnswer
-        Empty if there is only one record, if the effect is a curve without amplitudes, or if the fit fails.
-    chi2 : float
-        chi2 of the fit with separate amplitudes, at the model error of `before`; infinite if there is no such
-        fit.
+    Return the answers, with the user's number of each record, and chi2 with separate amplitudes at the model
+    error of `before`. There is no answer, and chi2 is infinite, if there is only one record, if the effect is
+    a curve without amplitudes, or if the fit fails.
     """
     films = np.unique(after.record.film).tolist()
     names = {p: f"{effect.name}.{p}" for p in effect.amplitudes if f"{effect.name}.{p}" in after.parameters}
@@ -131,13 +118,7 @@ def sentence(title: str, answers: Sequence[RecordAnswer]) -> str:
 
 
 def belief(effects: Sequence[tuple[str, Sequence[RecordAnswer]]]) -> str:
-    """Summarise which effects all records support, and which only some of them do.
-
-    Parameters
-    ----------
-    effects : sequence of (str, list of RecordAnswer)
-        Titles, and the records' answers.
-    """
+    """Summarise which effects, by their titles, all records support, and which only some of them do."""
     shared = [title for title, answers in effects if not contested(answers)]
     supported = " and ".join(shared) if shared else "none of the effects found"
     contested_effects = [sentence(title, answers) for title, answers in effects if contested(answers)]

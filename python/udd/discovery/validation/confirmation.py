@@ -36,24 +36,9 @@ def confirmed_by(
     frames carry too little information on the effect, each half of the record (alternate blocks) decreases
     chi2 further than the other half alone. With whole held-out records, only the first test applies.
 
-    Parameters
-    ----------
-    part, whole : pair of Fit
-        Without the effect and with it: fits of the training part, and of all data.
-    rest : Record
-        The frames that are not in the training part.
-    names : sequence of str
-        Parameters that the effect adds; empty for a curve.
-    unit : float
-        See :func:`udd.fitting.time_scale.motion_time_scale`.
-
-    Returns
-    -------
-    ratio : tuple of float
-        Cost of `rest` with the effect over cost without it, all parameters fixed, with its 95 % interval.
-    witness : str or None
-        The first test that the effect passes: ``"held"`` for the cost with fixed parameters, ``"fitted"`` for
-        the further decrease in chi2, ``"halves"`` for the halves of the record; None if it passes none.
+    Return the ratio of the costs of the held-out frames `rest`, with its 95 % interval, and the first test
+    that the effect passes: ``"held"``, ``"fitted"`` or ``"halves"``. `names` are the parameters that the
+    effect adds; a curve has none.
     """
     ratio = held_out_ratio(*part, rest, unit)
     if ratio[2] < 1.0:

@@ -16,17 +16,9 @@ from udd.fitting.sensor import is_encoder
 def camera_shows(base: Fit, extended: Fit) -> list[str] | None:
     """Test whether a fixed camera's errors are a rival of the effects; None if they are not.
 
-    Parameters
-    ----------
-    base, extended : Fit
-        Fits of all data, without the effects and with them.
-
-    Returns
-    -------
-    list of str or None
-        Names of the effects that are not needed once the camera's parameters are free: the other effects with
-        a free camera are at most ten nats behind. Empty if all effects with a free camera are more than ten
-        nats ahead, or if one is a formula, which may imitate the camera's errors.
+    Return the names of the effects that are not needed once the camera's parameters are free: the other
+    effects with a free camera are at most ten nats behind. There are none if all effects with a free camera
+    are more than ten nats ahead, or if one is a formula, which may imitate the camera's errors.
     """
     camera_parameters = _fixed(base)
     there = {e.name for e in base.model.effects}

@@ -114,18 +114,8 @@ class Errors:
 def held_out_errors(fit: Fit, record: Record, held_out: NDArray[np.bool_], unit: float = 1.0) -> Errors:
     """Compute the errors of a fitted model on the held-out frames of `record`.
 
-    Each free run starts from a state that is filtered from the second of data before it; time stays absolute.
-
-    Parameters
-    ----------
-    fit : Fit
-        Made without those frames.
-    record : Record
-        The whole measurement's frames.
-    held_out : ndarray of bool (n,)
-        Held-out frames: the last ones of each measurement, or all of some.
-    unit : float
-        See :func:`udd.fitting.time_scale.motion_time_scale`.
+    They are the last ones of each measurement, or all of some. Each free run starts from a state that is
+    filtered from the second of data before it; time stays absolute, in units of the motion's time scale.
     """
     profile = fit.model.profile
     wanted = tuple(h * unit for h in profile.discovery.horizons)

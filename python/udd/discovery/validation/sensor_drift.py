@@ -76,15 +76,7 @@ def as_random(before: Fit, after: Fit) -> Fit | None:
     smallest model error. If a law needs a larger one, its evidence must exceed that of the known model, each
     at its most probable model error. A disk is not tested: its camera sees all marks move.
 
-    Parameters
-    ----------
-    before, after : Fit
-        Fits of all data, without and with the added effects, from a search.
-
-    Returns
-    -------
-    Fit or None
-        The fit with random forces; None if they do not explain the record as well, or are not needed.
+    Return the fit with random forces; None if they do not explain the record as well, or are not needed.
     """
     if after.model.profile.sensor.sees_marks:
         return None
