@@ -106,7 +106,7 @@ def test_mere_products_and_several_terms_pay_more():
     order = sorted([usual, odd], key=lambda c: not c.usual)
 
     def prior(candidates):
-        return log_prior(TrialFit(candidates, None, [], 0.0, 1), 20)  # type: ignore[arg-type]
+        return log_prior(TrialFit(candidates, None, [], 0.0), 20)  # type: ignore[arg-type]
 
     assert [prior([c]) for c in order] == pytest.approx([-np.log(20), -np.log(20) - 5.0])
     assert prior(order) == pytest.approx(-2 * np.log(20) - 5.0)

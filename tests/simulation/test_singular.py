@@ -75,7 +75,7 @@ def test_a_covariance_without_an_inverse_tells_what_it_can():
     effects = [udd.effects.slip(), udd.effects.relaxation()]
     both = [SimpleNamespace(effect=e, amplitude_names=[n]) for e, n in zip(effects, "ab", strict=True)]
     twin = SimpleNamespace(**{**vars(fit), "scatter": 1.0, "covariance": np.zeros((2, 2))})
-    assert not TrialFit(both, twin, ["a", "b"], 0.0, 2).needed
+    assert not TrialFit(both, twin, ["a", "b"], 0.0).needed
 
 
 def test_scores_that_run_away_say_nothing():

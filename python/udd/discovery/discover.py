@@ -75,33 +75,18 @@ def discover(
 ) -> Discovery:
     """Select missing effects forward, by score tests and held-out data.
 
-    *Candidates.* The model is fitted to the first 60 % of the record. A score test (Rao) ranks all effects of
-    the library around that fit, and penalised splines of every coordinate. The best are fitted in full.
-    Effects that fail alone are tried in twos.
+    The model is fitted to the first 60 % of the record. Score tests (Rao) rank all effects of the library
+    around that fit, and penalised splines of every coordinate. The best are fitted in full, alone and in
+    twos, and so are formulas for the likely splines. The form with the largest log evidence on all data is
+    added if it is physical, significant at 0.1 % over all candidates (Bonferroni), and confirmed by the last
+    40 %. Then all coefficients are refitted, and the search continues. Forms within 10 nats are listed as
+    alternatives. The page "How discovery decides" explains the tests, and the conditions of "effect
+    identified".
 
-    *Acceptance.* An effect is added if it passes these tests:
-
-    - The decrease in chi2 is significant at 0.1 % over all candidates (Bonferroni), in the first 60 % and in
-      all data. In the latter the colour of the residuals counts.
-    - Its amplitudes are physical.
-    - The last 40 % confirm it. With all parameters fixed their cost decreases (95 % interval of the ratio
-      below 1), or chi2 decreases significantly further when they are fitted too. If these frames carry too
-      little information, each half of the record must confirm it after the other.
-    - Forecasts get worse at no horizon.
-    - No slow drift of the sensor's zero explains as much.
-
-    *Choice.* Of several forms the one with the largest log evidence on all data is chosen, each at its own
-    noise and model error. Splines over the likely coordinates, their formulas and a power with a free
-    exponent compete with the library. Forms within 10 nats are listed as alternatives. After an addition all
-    coefficients are refitted, and the search continues.
-
-    *Verdict.* An effect is identified if it has no rival, is a law of one term with all constants determined,
-    the held-out gain has a size, and nothing else is missing; `Discovery.doubts` lists reasons against it. It
-    is not identified if random forces explain as much, such as those of a moving support (a disk's film
-    excludes them). It is not confirmed if free runs over the last 40 % do not improve significantly, unless
-    they are at the noise floor already. If nothing passes, but chi2 per degree of freedom exceeds 2.5 or free
-    runs lose the motion, the model lacks an effect that these data do not identify. The closest candidates
-    are listed with their held-out errors.
+    An effect is not confirmed if free runs over the last 40 % do not improve significantly, unless they are
+    at the noise floor already. If nothing passes, but chi2 per degree of freedom exceeds 2.5 or free runs
+    lose the motion, the model lacks an effect that these data do not identify. The closest candidates are
+    listed with their held-out errors.
 
     Records of more than 8000 frames (2000 if inputs were measured) are averaged in blocks as far as their
     motion and noise allow.

@@ -88,11 +88,13 @@ class AddedEffect(OneLine):
 
     def __repr__(self) -> str:
         """Describe the effect on one line."""
-        values = ", ".join(
-            f"{name} = {with_error(v, self.errors.get(name))}" for name, v in self.parameters.items()
-        )
-        text = f"<AddedEffect {self.title}: {self.equation}, {values}; chi2 decreased by {self.chi2:.4g}>"
-        return cut(text, 300)
+        numbers = f"{self._numbers()}; chi2 decreased by {self.chi2:.4g}"
+        return cut(f"<AddedEffect {self.title}: {self.equation}, {numbers}>", 300)
+
+    def _numbers(self) -> str:
+        """Format the parameters with their errors."""
+        values = self.parameters.items()
+        return ", ".join(f"{name} = {with_error(v, self.errors.get(name))}" for name, v in values)
 
     def like_a_drift(self, model: Model) -> bool:
         """Return True for a curve over time alone, which may be the drift of a sensor's zero.
@@ -322,12 +324,8 @@ class Discovery(Drawable):
         """Format the verdict for notebooks."""
         from html import escape
 
-        def numbers(effect: AddedEffect) -> str:
-            errors = ((name, value, effect.errors.get(name)) for name, value in effect.parameters.items())
-            return ", ".join(f"{name} = {with_error(value, error)}" for name, value, error in errors)
-
         items = "".join(
-            f"<li>{escape(e.title)}: <code>{escape(e.expression)}</code>, {escape(numbers(e))}</li>"
+            f"<li>{escape(e.title)}: <code>{escape(e.expression)}</code>, {escape(e._numbers())}</li>"
             for e in self.effects
         )
         head, _, ratio = repr(self)[1:-1].partition("; ")

@@ -80,7 +80,7 @@ class ScoreRound:
 def score_round(
     fitted: Fit,
     given: Sequence[Candidate] = (),
-    watched: Callable[[Callable[[Fit], ScoreRound]], Callable[[Fit], ScoreRound]] = lambda work: work,
+    each: Callable[[Callable[[Fit], ScoreRound], list[Fit]], list[ScoreRound]] = parallel_map,
 ) -> ScoreRound:
     """Score every candidate and curve around the fit; with more model error if it explains little.
 
@@ -89,8 +89,7 @@ def score_round(
     tighter fit counts only if the looser one shows nothing, as with few or exact data. For other models both
     are scored, and the scores with the stronger explanation count: slow decays show only with a small model
     error.
-    `given` are the user's own candidates; `watched` wraps work so that it does not start once a search's time
-    is up.
+    `given` are the user's own candidates; `each` maps work while a search has time.
     """
 
     def score(current: Fit) -> ScoreRound:
@@ -104,11 +103,11 @@ def score_round(
 
     looser = with_larger_model_error(fitted, _SCATTER)
     if looser is fitted:
-        return watched(score)(fitted)
+        return each(score, [fitted])[0]
     both = not (fitted.model.profile.discovery.chaotic or beyond_schedule(looser))
-    rounds = parallel_map(watched(score), [fitted, looser] if both else [looser])
+    rounds = each(score, [fitted, looser] if both else [looser])
     if not (both or rounds[0].passing() or rounds[0].passing_curves()):
-        rounds.append(watched(score)(fitted))
+        rounds += each(score, [fitted])
     return replace(
         max(rounds, key=ScoreRound.strongest), comparisons=sum(entry.comparisons for entry in rounds)
     )

@@ -78,7 +78,7 @@ class Search:
         states, rounds = path.states, path.rounds
         while sum(len(step.candidates) for step in path.steps) < _MOST:
             self.tell("scoring candidates" + (" for a further effect" if path.steps else ""))
-            scores = score_round(states[-1].part, self.given, self.clock.watched)
+            scores = score_round(states[-1].part, self.given, self.clock.each)
             rounds.append(scores)
             addition = self._addition(states[-1], scores, with_more=bool(path.steps))
             if addition is None:
@@ -235,7 +235,9 @@ class Search:
         """
         self._leave_out(path)
         *earlier, last = path.steps
-        for k, step in enumerate(earlier if last.curve else []):
+        if last.curve is None:
+            return
+        for k, step in enumerate(earlier):
             self.tell(f"trying {last.curve.title} instead of {step.candidates[0].title}")
             # ODEBench 35: otherwise three effects replace one formula, with three times its held-out error.
             if self._relocated(path, k):

@@ -15,9 +15,7 @@ from udd._util.arguments import checked_arguments
 from udd._util.progress import Progress, with_status
 from udd.errors import FitError
 from udd.fitting import Fit, SolveError, at_level, continuous, fit_record, minimise, record_of, solve
-from udd.fitting.estimator_input import FilmParameters
 from udd.fitting.parameters import Free
-from udd.fitting.problem import Point
 from udd.fitting.record import Record
 from udd.measurement import Measurement
 from udd.models import Model
@@ -330,16 +328,11 @@ class _Pruning:
     def _again(
         self, fitted: Fit, free: tuple[Free, ...], start: Mapping[str, float], iterations: int = 40
     ) -> Fit | None:
-        places = {f.name: f.index for f in self.full.problem.free if f.role == "model" and f.film is None}
-        sets = []
-        for model, camera, clock in fitted.point.sets:
-            values = list(model)
-            for name in places.keys() & start.keys():
-                values[places[name]] = start[name]
-            sets.append(FilmParameters(values, camera, clock))
-        problem = replace(fitted.problem, free=free)
+        shared = (f for f in self.full.problem.free if f.role == "model" and f.film is None)
+        placed = {f.index: start[f.name] for f in shared if f.name in start}
+        point = fitted.point.with_values(lambda values: [placed.get(k, v) for k, v in enumerate(values)])
         try:
-            return minimise(problem, Point(fitted.point.states, tuple(sets)), iterations)
+            return minimise(replace(fitted.problem, free=free), point, iterations)
         except FitError:
             return None
 

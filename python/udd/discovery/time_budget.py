@@ -58,15 +58,11 @@ class Clock:
         """Limit the work inside: no fit starts once the time is up."""
         return limited(self.check)
 
-    def watched(self, work: Callable[[From], To]) -> Callable[[From], To]:
-        """Wrap work so that it does not start once the time is up."""
+    def each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
+        """Run independent pieces of work in parallel while there is time."""
 
-        def checked(piece: From) -> To:
+        def watched(piece: From) -> To:
             self.check()
             return work(piece)
 
-        return checked
-
-    def each(self, work: Callable[[From], To], pieces: Iterable[From]) -> list[To]:
-        """Run independent pieces of work in parallel while there is time."""
-        return parallel_map(self.watched(work), pieces)
+        return parallel_map(watched, pieces)

@@ -22,13 +22,19 @@ from .thresholds import ALPHA
 
 def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
     """Return True if an effect's amplitudes are significant with everything else free (Wald's test)."""
+    return wald(fitted, names) / fitted.shown >= chi_squared.isf(ALPHA, len(names))
+
+
+def wald(fitted: Fit, names: Sequence[str]) -> float:
+    """Compute the squared distance of parameters from zero in units of their covariance.
+
+    It is zero if they are collinear: fewer directions are identifiable than there are parameters.
+    """
     order = list(fitted.parameters)
     indices = [order.index(name) for name in names]
     a = np.array([fitted.parameters[name] for name in names])
-    block = fitted.covariance[np.ix_(indices, indices)] * fitted.shown
-    if np.linalg.matrix_rank(block) < len(indices):
-        return False  # its amplitudes are collinear: fewer directions are identifiable than it has parameters
-    return bool(a @ np.linalg.solve(block, a) >= chi_squared.isf(ALPHA, len(indices)))
+    block = fitted.covariance[np.ix_(indices, indices)]
+    return float(a @ np.linalg.solve(block, a)) if np.linalg.matrix_rank(block) == len(indices) else 0.0
 
 
 def cost_of_parameter(fitted: Fit) -> float:
@@ -49,8 +55,6 @@ class TrialFit:
         Parameters that the proposal adds.
     cost : float
         Cost of its freedom, nats.
-    freedom : float
-        Count of estimated numbers.
     curve : Curve or None
         The located curve.
     formula : Formula or None
@@ -61,7 +65,6 @@ class TrialFit:
     fit: Fit
     names: list[str]
     cost: float
-    freedom: float
     curve: Curve | None = None
     formula: Formula | None = None
 
@@ -69,6 +72,11 @@ class TrialFit:
     def amplitudes(self) -> list[float]:
         """Fitted values of the added parameters."""
         return [self.fit.parameters[name] for name in self.names]
+
+    @property
+    def freedom(self) -> float:
+        """Count of estimated numbers."""
+        return self.curve.df if self.curve is not None and self.formula is None else len(self.names)
 
     @property
     def rank(self) -> tuple[int, float]:
@@ -115,7 +123,7 @@ def of_library(
         return None
     names = [name for c in candidates for name in c.amplitude_names]
     cost = cost_of_parameter(fitted) * sum(c.parameters for c in candidates)
-    trial = TrialFit(candidates, fitted, names, cost, len(names))
+    trial = TrialFit(candidates, fitted, names, cost)
     return trial if trial.physical and fitted.converged else None
 
 
@@ -137,7 +145,7 @@ def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | N
     if not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)
-    return TrialFit([candidate], located.fit, [], located.cost, located.curve.df, located.curve)
+    return TrialFit([candidate], located.fit, [], located.cost, located.curve)
 
 
 def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None = None) -> TrialFit | None:
@@ -150,7 +158,7 @@ def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None =
     effect = fitted.model.effects[-1]
     names = [f"{name}.{p}" for p in effect.parameters]
     cost = cost_of_parameter(fitted) * len(names)
-    trial = TrialFit([Candidate(effect, effect.title)], fitted, names, cost, len(names), curve, written)
+    trial = TrialFit([Candidate(effect, effect.title)], fitted, names, cost, curve, written)
     return trial if trial.physical and fitted.converged else None
 
 

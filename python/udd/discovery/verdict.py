@@ -15,6 +15,7 @@ from udd.fitting.diagnostics import readings
 
 from .natural_zero import shift_ranges
 from .results import AddedEffect
+from .trial_fits import wald
 
 _SIZE = 0.98  # ratio of held-out errors below which a gain has a size
 _DETERMINED = 3.0  # standard errors
@@ -101,14 +102,11 @@ def undetermined(added: AddedEffect, final: Fit) -> list[str]:
     groups = [amplitudes, *([p] for p in added.errors if p not in amplitudes)]
     ranges = shift_ranges(added.effect, final)
     for group in filter(None, groups):
-        rows = [order.index(f"{added.effect.name}.{p}") for p in group]
-        values = np.array([added.parameters[p] for p in group])
-        block = final.covariance[np.ix_(rows, rows)]
+        names = [f"{added.effect.name}.{p}" for p in group]
         if group[0] in ranges:
-            if not _DETERMINED * np.sqrt(block[0, 0]) < ranges[group[0]] / 2:
-                result += group
-        elif np.linalg.matrix_rank(block) < len(rows) or (
-            values @ np.linalg.solve(block, values) < _DETERMINED**2
-        ):
-            result += group
+            row = order.index(names[0])
+            is_determined = _DETERMINED * np.sqrt(final.covariance[row, row]) < ranges[group[0]] / 2
+        else:
+            is_determined = wald(final, names) >= _DETERMINED**2
+        result += [] if is_determined else group
     return result

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,22 +63,20 @@ class Responses:
 
     def along(self, coordinate: Coordinate) -> Array:
         """Return a coordinate's values, (n, q)."""
-        result = np.zeros(self.t.shape)
-        for film_coordinate, film in self._of_films(coordinate):
-            result[film] = film_coordinate.of(self.t[film], self.states[film])
-        return result
+        return self._of_films(coordinate, lambda c, film: c.of(self.t[film], self.states[film]))
 
     def speed(self, coordinate: Coordinate) -> Array:
         """Return a coordinate's rate of change, (n, q)."""
-        result = np.zeros(self.t.shape)
-        for film_coordinate, film in self._of_films(coordinate):
-            result[film] = film_coordinate.rate(self.states[film], self.rates[film])
-        return result
+        return self._of_films(coordinate, lambda c, film: c.rate(self.states[film], self.rates[film]))
 
-    def _of_films(self, coordinate: Coordinate) -> list[tuple[Coordinate, NDArray[np.bool_]]]:
-        """Return the coordinate for each film's own drive, with the film's links."""
-        films = zip(self.fit.models, self.films, strict=True)
-        return [(named(model, coordinate.name), film) for model, film in films]
+    def _of_films(
+        self, coordinate: Coordinate, value: Callable[[Coordinate, NDArray[np.bool_]], Array]
+    ) -> Array:
+        """Evaluate the coordinate for each film's own drive."""
+        result = np.zeros(self.t.shape)
+        for model, film in zip(self.fit.models, self.films, strict=True):
+            result[film] = value(named(model, coordinate.name), film)
+        return result
 
     def columns(self, slot: Slot, value: Array, rate: Array) -> Array:
         """Compute the change of the state at a link's end by forcings (n, q, k) and rates, (n, d, k)."""
@@ -109,7 +107,7 @@ def responses(fit: Fit) -> Responses:
     return Responses(fit, t, states, rates, response, linked, films)
 
 
-def score_forcings(fit: Fit, columns: Sequence[Array], parameters_fixed: bool = False) -> list[Score]:
+def score_forcings(fit: Fit, columns: Iterable[Array], parameters_fixed: bool = False) -> list[Score]:
     """Score groups of columns, each as if it were alone, with the free parameters refitted or fixed.
 
     A group, (n - 1, d, k), is the change of the state at every link's end with each amplitude.
@@ -132,10 +130,12 @@ def score_forcings(fit: Fit, columns: Sequence[Array], parameters_fixed: bool = 
     return scores
 
 
-def _batches(columns: Sequence[Array]) -> list[list[Array]]:
-    batches: list[list[Array]] = []
+def _batches(columns: Iterable[Array]) -> Iterator[list[Array]]:
+    batch: list[Array] = []
     for column in columns:
-        if not batches or sum(c.shape[-1] for c in batches[-1]) + column.shape[-1] > _COLUMNS:
-            batches.append([])
-        batches[-1].append(column)
-    return batches
+        if batch and sum(c.shape[-1] for c in batch) + column.shape[-1] > _COLUMNS:
+            yield batch
+            batch = []
+        batch.append(column)
+    if batch:
+        yield batch

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,6 @@ from .term_library import waves
 _ABSORBED = 1e-4
 _ALIKE = 1e6  # condition number of the information above which candidates are not distinguishable
 _STRONG = 4.0  # factor on the usual amplitudes, for effects that may have either sign
-_FORCINGS = 100  # scored at a time, to limit the memory for a long record
 _AT_ONCE = 20_000  # evaluated together: some ten megabytes
 _MOST_PAIRS = 700_000  # evaluated in all: a few seconds
 _LINES = 24  # strongest lines of a frequency scan, whose neighbourhoods are scanned too
@@ -205,17 +204,19 @@ def scored_forcings(
 ) -> list[Scored]:
     """Score candidates by their forcings. `column` computes a forcing, or returns None if it is undefined."""
     scatter = max(fit.scatter, 1.0)
-    result: list[Scored] = []
-    for first in range(0, len(candidates), _FORCINGS):
-        columns = [(c, column(c)) for c in candidates[first : first + _FORCINGS]]
-        usable = [(c, values) for c, values in columns if values is not None]
-        scores = score_forcings(fit, [values for _c, values in usable])
-        for (candidate, _values), score in zip(usable, scores, strict=True):
-            gradient, information, alone = (
-                scatter * part for part in (score.gradient, score.information, score.alone)
-            )
-            result.append(score_of(candidate, gradient, information, alone, scatter))
-    return result
+    defined: list[Candidate] = []
+
+    def columns() -> Iterator[NDArray[np.float64]]:
+        for candidate in candidates:
+            if (values := column(candidate)) is not None:
+                defined.append(candidate)
+                yield values
+
+    scores = score_forcings(fit, columns())
+    return [
+        score_of(c, scatter * s.gradient, scatter * s.information, scatter * s.alone, scatter)
+        for c, s in zip(defined, scores, strict=True)
+    ]
 
 
 def score_of(
