@@ -256,18 +256,13 @@ class Acceptance:
                 return -math.inf
 
         if self.all_are_free(current.part):
-            evidence = self.clock.each(first, trials)
-            most = max(evidence, default=0.0) - _WIDE * EVIDENCE_MARGIN
-            likely = sorted(zip(evidence, trials, strict=True), key=lambda pair: -pair[0])
-            leading = [trial for z, trial in likely if z > most]
+            behind = [-z for z in self.clock.each(first, trials)]
+            most = min(behind, default=0.0) + _WIDE * EVIDENCE_MARGIN
         else:  # fixed parameters distort forms: compare them with all parameters free, and on all data
-            least = min((t.fit.scatter for t in trials), default=0.0)
-            leading = sorted(
-                (t for t in trials if t.fit.scatter < _BIAS_SCATTER_RATIO * least),
-                key=lambda t: t.fit.scatter,
-            )
-        likeliest = {id(trial) for trial in leading[:_COMPARED]}
-        return [trial for trial in trials if id(trial) in likeliest]
+            behind = [t.fit.scatter for t in trials]
+            most = _BIAS_SCATTER_RATIO * min(behind, default=0.0)
+        likely = sorted((value, k) for k, value in enumerate(behind) if value < most)
+        return [trials[k] for k in sorted(k for _value, k in likely[:_COMPARED])]
 
     def _at_own_noise(self, fitted: Fit) -> Fit:
         """Refit at the most probable noise and model error, with all the user's free parameters."""

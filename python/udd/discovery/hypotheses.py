@@ -190,8 +190,10 @@ def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[Hypothesis]:
     """Put the library's law before the leading formula of ranked hypotheses if they are equivalent."""
-    first = order[0] if order and order[0].trial.formula else None
-    for other in order[1:] if first else []:
+    if not order or order[0].trial.formula is None:
+        return list(order)
+    first = order[0]
+    for other in order[1:]:
         is_close = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
         if is_close and other.constants <= first.constants and contains(other, first, known_parameters):
             return [other, *(h for h in order if h is not other)]

@@ -71,10 +71,6 @@ class Spline:
         result: Array = second.T @ second
         return result
 
-    def full(self, coefficients: Array) -> Array:
-        """Return the coefficients for a spline without a period, `intervals + 3` of them."""
-        return np.concatenate([coefficients, coefficients[:3]]) if self.periodic else coefficients
-
 
 def along(x: Array, angle: bool, intervals: int) -> Spline:
     """Make the basis for the places that a record visits.

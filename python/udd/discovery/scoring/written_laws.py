@@ -51,8 +51,12 @@ def laws(
     ranges |= {called[p]: shape.range for p, shape in shapes.items()}
     linear, names = [called[p] for p in amplitudes], tuple(called.values())
     spec = written(slot, text.format(**called), name or word_for(title), title, linear, ranges, names)
-    shaped = {called[p]: {"role": shape.role, "grid": shape.grid} for p, shape in shapes.items()}
-    spec = replace(spec, parameters=tuple(replace(p, **shaped.get(p.name, {})) for p in spec.parameters))
+    shaped = {called[p]: shape for p, shape in shapes.items()}
+    listed = (
+        replace(p, role=shaped[p.name].role, grid=shaped[p.name].grid) if p.name in shaped else p
+        for p in spec.parameters
+    )
+    spec = replace(spec, parameters=tuple(listed))
     zero = (0.0,) * len(amplitudes)
     return [Candidate(effects.Effect(spec.name, (*zero, *values), made=spec), title) for values in tried]
 

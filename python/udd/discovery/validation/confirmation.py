@@ -78,19 +78,11 @@ def _expected(part: Fit, whole: Pair, names: Sequence[str]) -> float:
 
     def information(fit: Fit) -> Array:
         indices = [list(fit.parameters).index(name) for name in names]
-        return _inverse(fit.covariance[np.ix_(indices, indices)])
+        result: Array = np.linalg.pinv(fit.covariance[np.ix_(indices, indices)], hermitian=True)
+        return result
 
     size = np.array([part.parameters[name] for name in names])
     return float(size @ (information(after) - information(part)) @ size / after.inflation(before))
-
-
-def _inverse(covariance: Array) -> Array:
-    """Invert a covariance, or take the pseudo-inverse if it is singular."""
-    try:
-        result: Array = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        result = np.asarray(np.linalg.pinv(covariance, hermitian=True), dtype=np.float64)
-    return result
 
 
 def _split_half_test(whole: Pair, unit: float) -> bool:
