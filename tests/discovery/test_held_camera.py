@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import udd
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.discovery.validation.held_camera import camera_shows
 from udd.fitting import extend, fit_record, most_probable, record_of, refit
 from udd.fitting.sensor import roughness

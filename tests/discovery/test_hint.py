@@ -13,7 +13,7 @@ import discovered
 import udd
 from simulated import film
 from udd.discovery.experiment_design import _films, _ranked
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.fitting import at_level, fit_record, record_of
 from udd.report import as_text, summary_of
 

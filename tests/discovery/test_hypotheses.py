@@ -13,10 +13,10 @@ import pytest
 import udd
 from udd.discovery import hypotheses
 from udd.discovery.hypotheses import Hypothesis, contains, log_evidence, log_prior, named, ranked, rivals
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.results import AddedEffect
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.symbolic.expressions import is_single_term, length, read
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.discovery.verdict import doubts_of, has_size, undetermined, verdict_of
 from udd.fitting import at_level, extend, fit_record, most_probable, record_of, refit
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from udd.discovery import proposals
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.proposals import Proposals
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 
 
 def candidate(title: str, width: float = 0.0) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd._util.parallel import parallel_map
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.score_scan import Scan
 from udd.discovery.symbolic.formulas import Formula, formulas_for, power_for, without
@@ -38,14 +38,13 @@ from udd.fitting.parameters import Free
 from .hypotheses import Hypothesis, log_evidence, log_prior, named, ranked, rivals
 from .results import Alternative
 from .score_rounds import ScoreRound
-from .thresholds import ALPHA, Confirmation
+from .thresholds import ALPHA, EVIDENCE_MARGIN, ROUGH_MARGIN, Confirmation
 from .time_budget import Clock
 from .trial_fits import TrialFit, fitted_ones, needed_in, of_curve, of_formula, of_library
 
 _WORSE = 1.1  # lower end of the errors' ratio at some horizon, above which an effect is rejected
 _DRIFT = 0.7  # share of an effect's gain above which a sensor's drift, with the motion fixed, may explain it
 _FORMULAS = 3  # for each curve, fitted in full
-_WIDE = 3  # times the margin by which a form may be behind in the training part
 # ratio of the scatter of all data to that of the training part, above which a fit may have ended elsewhere
 _MAX_SCATTER_RATIO = 1.5
 # While parameters are fixed, forms with a scatter within this factor of the least are compared with all
@@ -257,7 +256,7 @@ class Acceptance:
 
         if self.all_are_free(current.part):
             behind = [-z for z in self.clock.each(first, trials)]
-            most = min(behind, default=0.0) + _WIDE * EVIDENCE_MARGIN
+            most = min(behind, default=0.0) + ROUGH_MARGIN
         else:  # fixed parameters distort forms: compare them with all parameters free, and on all data
             behind = [t.fit.scatter for t in trials]
             most = _BIAS_SCATTER_RATIO * min(behind, default=0.0)

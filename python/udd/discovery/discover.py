@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from udd._util import background_import
 from udd._util.arguments import checked_arguments
 from udd._util.expressions import Expression
-from udd._util.parallel import parallel_map
 from udd._util.progress import Progress, with_status
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
@@ -24,22 +19,7 @@ from udd.discovery.validation.held_out_errors import lacks_more, misses_the_moti
 from udd.discovery.validation.sensor_drift import FORETELLS, as_random
 from udd.effects import Effect
 from udd.errors import FitError
-from udd.fitting import (
-    UNEXPLAINED,
-    Fit,
-    SolveError,
-    as_stated,
-    checked_units,
-    continuous,
-    eased,
-    fit_record,
-    options_of,
-    ran_away,
-    record_of,
-    refit,
-)
-from udd.fitting.record import Record
-from udd.fitting.thinning import Thinned, thinned
+from udd.fitting import UNEXPLAINED, Fit, as_stated, eased, options_of, ran_away, refit
 from udd.fitting.time_scale import motion_time_scale
 from udd.measurement import Measurement
 from udd.models import Model
@@ -48,13 +28,13 @@ from udd.models.formula_model import FormulaModel
 from .acceptance import Acceptance, SearchState, Step
 from .results import AddedEffect, Discovery, RejectedEffect
 from .search import Outcome, Search
+from .search_data import SearchData, known_model_fits, prepared
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
 from .verdict import doubts_of, verdict_of
 
 #: Share of the record for training; the rest is for tests.
 TRAIN = 0.6
-_SHORTEST = 20  # frames; with fewer the training part determines no model and the rest tests none
 
 
 @checked_arguments(error=FitError)
@@ -159,7 +139,7 @@ def discover(
     assert callable(progress)
     clock = Clock(budget, progress)
     options = options_of(free, camera, priors, each)
-    data = _prepared(measurement, model, state0, held_out)
+    data = prepared(measurement, model, state0, held_out, TRAIN)
     if data.held_out and (each is not None or any("[" in name for name in priors or {})):
         raise FitError(
             "held_out cannot be used with each, or with priors of single records: "
@@ -168,7 +148,7 @@ def discover(
     given = _given(_first(model), candidates)
     clock.finish("fitting the known model")
     background_import.importing("scipy.stats", "pyoperon.sklearn")
-    part, whole, constrained = _known_model(data, options)
+    part, whole, constrained = known_model_fits(data, options)
     tests = Acceptance(data.record, ~data.train, clock, motion_time_scale(part), part.problem.free)
     known_fits = SearchState(part, whole, tests.errors(part))
     search = Search(tests, given)
@@ -178,88 +158,8 @@ def discover(
     return _answer(data, known_fits, begin, search, end, constrained)
 
 
-@dataclass(frozen=True)
-class _Data:
-    """Measurements of a search, their record, and its division into training and held-out frames.
-
-    Attributes
-    ----------
-    measurement, model
-        As for :func:`udd.discover`, held-out measurements last.
-    thin : list of Thinned
-    record : Record
-    train : ndarray (n,) of bool
-    order : list of int
-        The measurements' numbers in this order.
-    held_out : int
-        Count of whole held-out measurements.
-    """
-
-    measurement: Measurement | Sequence[Measurement]
-    model: Model | Sequence[Model]
-    thin: list[Thinned]
-    record: Record
-    train: NDArray[np.bool_]
-    order: list[int]
-    held_out: int
-
-    @property
-    def split(self) -> float:
-        """Time of the first frame that is not for training, s."""
-        later = ~(self.record.first(TRAIN) if self.held_out else self.train)
-        return float(self.record.clock[np.flatnonzero(later)[0]])
-
-    @property
-    def parts(self) -> tuple[Record, ...]:
-        """The training frames and the whole record; with held-out measurements only the first."""
-        training = self.record.part(self.train)
-        return (training,) if self.held_out else (training, self.record)
-
-
-def _prepared(measurement: Any, model: Any, state0: Any, held_out: Iterable[int] | None) -> _Data:
-    """Order, thin and divide the measurements."""
-    order, count = _held_out(measurement, held_out)
-    if count:
-        measurement, model, state0 = (_ordered(given, order) for given in (measurement, model, state0))
-    thin = _thinned(continuous(measurement, model), model)
-    measurement = [part.measurement for part in thin]
-    if len(measurement) == 1:
-        measurement, model, state0 = measurement[0], _only(model), _only(state0)
-    record = record_of(measurement, model, state0)
-    if (n := len(record.t)) < _SHORTEST:
-        raise FitError(f"the record has {n} frames; to find and test an effect needs at least {_SHORTEST}")
-    trained = range(len(order) - count)
-    train = np.isin(record.film, trained) if count else record.first(TRAIN)
-    return _Data(measurement, model, thin, record, train, order, count)
-
-
-def _known_model(data: _Data, options: dict[str, Any]) -> tuple[Fit, Fit, dict[str, tuple[float, float]]]:
-    """Fit the known model to both parts; also return priors of parameters that these do not determine."""
-    constrained: dict[str, tuple[float, float]] = {}
-    stated_priors = dict(options["priors"] or {})
-
-    def fits() -> tuple[Fit, ...]:
-        while True:
-            options["priors"] = {**constrained, **stated_priors}
-            try:
-                return tuple(
-                    parallel_map(
-                        lambda some: fit_record(data.measurement, some, data.model, **options, search=True),
-                        data.parts,
-                    )
-                )
-            except SolveError as error:
-                more = _near_the_stated(data.model, error.undetermined, options["priors"])
-                if not more:
-                    raise
-                constrained.update(more)
-
-    fitted = checked_units(data.measurement, data.model, options, fits)
-    return fitted[0], fitted[-1], constrained
-
-
 def _answer(
-    data: _Data,
+    data: SearchData,
     known_fits: SearchState,
     begin: SearchState,
     search: Search,
@@ -320,81 +220,15 @@ def _answer(
         stopped=stopped,
         excused=None if excused is None else [f.title for f in added if f.effect.name in excused],
         random=random.doubts.missed if random else [],
-        held_out=tuple(sorted(data.order[len(data.order) - data.held_out :])),
+        held_out=data.held_out_numbers,
         undetermined=tuple(constrained),
         doubts=doubts,
     )
 
 
-def _near_the_stated(
-    model: Model | Sequence[Model], names: Iterable[str], priors: Mapping[str, tuple[float, float]]
-) -> dict[str, tuple[float, float]]:
-    """Return priors of parameters without one: the given value ± 100 %."""
-    result = {}
-    for label in sorted(names):
-        name, _, film = label.partition("[")
-        model_of_film = model if isinstance(model, Model) else model[int(film.rstrip("]") or 0)]
-        value = model_of_film.parameters.get(name, 0.0)
-        if value and not {label, name} & set(priors):
-            result[label] = (value, abs(value))
-    return result
-
-
-def _held_out(
-    measurement: Measurement | Sequence[Measurement], held_out: Iterable[int] | None
-) -> tuple[list[int], int]:
-    """Return the measurements' numbers, with the held-out ones last, and the count of these.
-
-    Raises
-    ------
-    FitError
-        A number does not exist, or no measurement is left to fit.
-    """
-    number = len(measurement) if isinstance(measurement, (list, tuple)) else 1
-    if held_out is None:
-        return list(range(number)), 0
-    try:
-        last = sorted({operator.index(number_given) for number_given in held_out})
-    except TypeError:
-        raise FitError(
-            f"held_out must be a list of the measurements' numbers, as in held_out=[2], not {held_out!r}"
-        ) from None
-    if not last or not 0 <= last[0] <= last[-1] < number or len(last) == number:
-        raise FitError(
-            f"held_out must name some of the measurements 0 to {number - 1}, but not all, not {last}"
-            if number > 1
-            else "held_out needs several measurements; with one, its last part is the held-out data"
-        )
-    return [k for k in range(number) if k not in last] + last, len(last)
-
-
-def _ordered(given: Any, order: Sequence[int]) -> Any:
-    """Reorder a list for several measurements; return anything else unchanged."""
-    return (
-        [given[k] for k in order] if isinstance(given, (list, tuple)) and len(given) == len(order) else given
-    )
-
-
-def _only(given: Any) -> Any:
-    """Return the entry of a list of one; return anything else unchanged."""
-    return given[0] if isinstance(given, (list, tuple)) and len(given) == 1 else given
-
-
 def _first(models: Any) -> Any:
     """Return the first of a list of models, or None if it is empty; a single model is returned unchanged."""
     return next(iter(models), None) if isinstance(models, (list, tuple)) else models
-
-
-def _thinned(
-    measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
-) -> list[Thinned]:
-    """Thin measurements that were sampled faster than their motion requires."""
-    some: list[Measurement] = [measurement] if isinstance(measurement, Measurement) else []
-    if isinstance(measurement, (list, tuple)):
-        some = list(measurement)
-    if not some or not all(isinstance(part, Measurement) for part in some):
-        record_of(measurement, model)  # which raises the error
-    return [thinned(part) for part in some]
 
 
 def _begin(search: Search, start: SearchState) -> SearchState:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from udd import _core
 from udd._util.odds import odds
 from udd._util.parallel import parallel_map
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import renamed
 from udd.effects import Effect
@@ -24,6 +23,8 @@ from udd.fitting.parameters import Free
 from udd.fitting.problem import Point, Problem
 from udd.models import Model
 from udd.simulation.trajectory import integrated
+
+from .thresholds import EVIDENCE_MARGIN
 
 if TYPE_CHECKING:
     from .results import Alternative, Discovery

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.scoring.candidate import brakes_with_time, like_geometry
 from udd.discovery.scoring.look_alikes import by_parameter
 from udd.discovery.symbolic.expressions import length
@@ -19,6 +18,7 @@ from udd.effects import Effect
 from udd.errors import ModelError
 from udd.fitting import Fit
 
+from .thresholds import EVIDENCE_MARGIN
 from .trial_fits import TrialFit
 
 Array = NDArray[np.float64]

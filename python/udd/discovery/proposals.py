@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from udd._util import chi_squared
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.nonparametric.curve_scan import Curve
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.look_alikes import look_alikes
 from udd.discovery.scoring.score_scan import Scored
@@ -15,7 +15,7 @@ from udd.effects.user_defined import along_of
 from udd.fitting import Fit, Goal
 
 from .score_rounds import ScoreRound, most_probable_first
-from .thresholds import ALPHA
+from .thresholds import ALPHA, EVIDENCE_MARGIN, ROUGH_MARGIN
 from .time_budget import Clock
 from .trial_fits import (
     TrialFit,
@@ -31,7 +31,6 @@ _ALIKE = 6  # further candidates that act almost like the best
 _TOGETHER = 6  # pairs of effects that may pass only together
 _COORDINATES = 4  # coordinates over which curves are located
 _HOPELESS = 2.0  # ratio to the best fit's chi2 above which a fit that does not converge is abandoned
-_FAR = 30.0  # nats by which a curve may score below the best term of the library
 _PAIRED = 4  # best-scored effects of which all pairs are fitted in full
 
 
@@ -88,7 +87,7 @@ class Proposals:
         if not single:
             return []
         # If a library term scores far higher than every curve, no curve is its rival.
-        least = max(single[0].evidence - EVIDENCE_MARGIN, self.scores.strongest() - _FAR)
+        least = max(single[0].evidence - EVIDENCE_MARGIN, self.scores.strongest() - ROUGH_MARGIN)
         likely = [c for c in single if c.evidence > least]
         likely += [c for c in single if c.name == ("friction", "|Omega|") and c not in likely]
         kinds = list(dict.fromkeys(c.key_without_momentum for c in likely))[:_COORDINATES]

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from udd._util.parallel import parallel_map
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve, scan_curves
+from udd.discovery.nonparametric.curve_scan import Curve, scan_curves
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.candidates import library
 from udd.discovery.scoring.score_scan import Scan, Scored, scan, strongest_ripple
 from udd.discovery.scoring.shape_scan import strongest_shapes
 from udd.fitting import Fit, beyond_schedule, with_larger_model_error
 
-from .thresholds import ALPHA
+from .thresholds import ALPHA, EVIDENCE_MARGIN
 from .trial_fits import cost_of_parameter
 
 _LEADS = 2.0  # ratio to the gain of the library's best; no two of its effects gain more together

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
 from udd.discovery.scoring.candidate import brakes_with_time
 from udd.discovery.validation.by_record import contested
 from udd.discovery.validation.held_out_errors import Ratio
@@ -15,6 +14,7 @@ from udd.fitting.diagnostics import readings
 
 from .natural_zero import shift_ranges
 from .results import AddedEffect
+from .thresholds import EVIDENCE_MARGIN
 from .trial_fits import wald
 
 _SIZE = 0.98  # ratio of held-out errors below which a gain has a size

@@ -13,6 +13,7 @@ from udd._util.one_line import OneLine
 from udd._util.parallel import parallel_map
 from udd.discovery.scoring.coordinates import Slot, coordinates, slots
 from udd.discovery.scoring.forcing import Responses, Score, responses, score_forcings
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.fitting import Fit
 from udd.models.profile import Coordinate
 
@@ -21,8 +22,6 @@ from .penalized_curves import Confounding, chance, smooth
 
 Array = NDArray[np.float64]
 
-#: Difference in log evidence (nats) below which explanations are not distinguished.
-EVIDENCE_MARGIN = 10.0
 #: Intervals between knots along a coordinate.
 INTERVALS = 14
 #: The same along a periodic angle: it resolves five waves per turn.

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import least_squares
 
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN, Curve
+from udd.discovery.nonparametric.curve_scan import Curve
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 
 from .expressions import (
     Node,

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterable
 
 from udd.discovery.hypotheses import log_evidence
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.errors import FitError
 from udd.fitting import Fit, extend, most_probable, ran_away, released
 from udd.fitting.parameters import Free, free_parameters

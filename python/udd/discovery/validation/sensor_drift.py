@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from udd.discovery.nonparametric.curve_scan import EVIDENCE_MARGIN
+from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.discovery.trial_fits import cost_of_parameter
 from udd.fitting import Fit, eased
 from udd.fitting.time_scale import correlation_time, takes_to_change
