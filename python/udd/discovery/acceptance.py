@@ -40,7 +40,7 @@ from .results import Alternative
 from .score_rounds import ScoreRound
 from .thresholds import ALPHA, EVIDENCE_MARGIN, ROUGH_MARGIN, Confirmation
 from .time_budget import Clock
-from .trial_fits import TrialFit, fitted_ones, needed_in, of_curve, of_formula, of_library
+from .trial_fits import TrialFit, attempted, fitted_ones, needed_in, of_curve, of_formula, of_library
 
 _WORSE = 1.1  # lower end of the errors' ratio at some horizon, above which an effect is rejected
 _DRIFT = 0.7  # share of an effect's gain above which a sensor's drift, with the motion fixed, may explain it
@@ -315,15 +315,9 @@ class Acceptance:
         A drive that is fixed 0.1 % off distorts forms more than they differ.
         """
         # Without this a slip in the constraint alone is mistaken for a consistent one with radial friction.
-        if self.all_are_free(fitted):
-            return fitted
-        try:
-            result = released_anew(fitted, self.free)
-        except FitError:
-            return fitted
-        return (
-            result if result.converged and result.level >= fitted.level and not ran_away(result) else fitted
-        )
+        result = None if self.all_are_free(fitted) else attempted(released_anew, fitted, self.free)
+        better = result and result.converged and result.level >= fitted.level and not ran_away(result)
+        return result if result and better else fitted
 
     def judged(
         self,
@@ -352,10 +346,7 @@ class Acceptance:
 
     def errors_or_none(self, fitted: Fit) -> Errors | None:
         """Compute the held-out errors; None if the model cannot be run over the held-out frames."""
-        try:
-            return self.errors(fitted)
-        except FitError:
-            return None
+        return attempted(self.errors, fitted)
 
     def _again(self, current: SearchState, trial: TrialFit) -> TrialFit | None:
         """Fit the same proposal to all data."""

@@ -31,6 +31,7 @@ from .search import Outcome, Search
 from .search_data import SearchData, known_model_fits, prepared
 from .thresholds import SAME
 from .time_budget import Clock, TimeUpError
+from .trial_fits import attempted
 from .verdict import doubts_of, verdict_of
 
 #: Share of the record for training; the rest is for tests.
@@ -239,10 +240,7 @@ def _begin(search: Search, start: SearchState) -> SearchState:
     if not (ran_away(start.part) or ran_away(start.whole)):
         return start
     # Without this a formula of the friction replaces a strong cubic drag.
-    try:
-        return search.tests.refitted(start, as_stated)
-    except FitError:
-        return start
+    return attempted(search.tests.refitted, start, as_stated) or start
 
 
 def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:

@@ -231,9 +231,7 @@ class _Pair:
         problem, point = self._with(more)
         model = problem.models[0]
         forms = [_still(self.chosen), _still(Candidate(self.other.effect, self.other.title))]
-        _gradient, information, _alone = _core.score(
-            problem.at(point), [(c.added_to(model), c.amplitude_indices(model)) for c in forms]
-        )
+        _gradient, information, _alone = _core.score(problem.at(point), [c.scored_in(model) for c in forms])
         k = len(self.chosen.amplitude_names)
         effects, rival_effects = np.arange(k), np.arange(k, len(information))
         a = _amplitudes(self.chosen.effect)

@@ -48,11 +48,6 @@ def log_evidence(fitted: Fit, names: Sequence[str]) -> float:
     return float(evidence - size / 2 - len(rows) * math.log(fitted.observations) / 2)
 
 
-def spent(trial: TrialFit) -> float:
-    """Return the cost of a spline's freedom in nats; its coefficients are fixed in a fit."""
-    return trial.cost if trial.is_curve else 0.0
-
-
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """One or several laws, fitted to the training part of a record and to all of it.
@@ -84,8 +79,10 @@ class Hypothesis:
         unsure = max(fitted.scatter, 1.0) / fitted.shown - 1.0
         shapes = sum(c.shapes for c in self.trial.candidates) * math.log(fitted.observations) / 2
         angles = EVIDENCE_MARGIN * sum(like_geometry(c.effect) for c in self.trial.candidates)
-        cost = spent(self.again) + shapes + angles - (self.prior if self.trial.curve is not None else 0.0)
-        return log_evidence(self.whole, self.again.names) - spent(self.again) + self.prior - cost * unsure
+        # A spline's coefficients are fixed in a fit: the cost of their freedom is known from its score.
+        freedom = self.again.cost if self.again.is_curve else 0.0
+        cost = freedom + shapes + angles - (self.prior if self.trial.curve is not None else 0.0)
+        return log_evidence(self.whole, self.again.names) - freedom + self.prior - cost * unsure
 
     @property
     def constants(self) -> int:

@@ -21,7 +21,7 @@ from .results import RejectedEffect
 from .score_rounds import ScoreRound, most_probable_first, score_round
 from .thresholds import ALPHA, RejectionReason
 from .time_budget import TimeUpError
-from .trial_fits import TrialFit, fitted_ones, needed_in, of_library
+from .trial_fits import TrialFit, attempted, fitted_ones, needed_in, of_library
 
 _NEAREST = 6  # closest candidates to report if none passes
 _MOST = 3  # maximum of added effects
@@ -141,9 +141,8 @@ class Search:
         # Without this a spurious eccentric mass and a spurious curve follow a strong cubic drag.
         if self.tests.all_are_free(state.part) and not reestimate_noise:
             return state
-        try:
-            free = self.tests.refitted(state, partial(released_anew, free=self.tests.free))
-        except FitError:
+        free = attempted(self.tests.refitted, state, partial(released_anew, free=self.tests.free))
+        if free is None:
             return state
         fits = free.part, free.whole
         better = not any(map(ran_away, fits)) or self.tests.improvement(state.errors, free.errors)[2] < 1.0

@@ -21,6 +21,7 @@ from udd.measurement import Measurement
 from udd.models import Model
 
 from .thresholds import ALPHA
+from .trial_fits import attempted
 
 _FAR = -6.0  # change of the criterion below which terms are removed several at a time
 _EQUAL = 1e-3  # in the criterion
@@ -331,10 +332,7 @@ class _Pruning:
         shared = (f for f in self.full.problem.free if f.role == "model" and f.film is None)
         placed = {f.index: start[f.name] for f in shared if f.name in start}
         point = fitted.point.with_values(lambda values: [placed.get(k, v) for k, v in enumerate(values)])
-        try:
-            return minimise(replace(fitted.problem, free=free), point, iterations)
-        except FitError:
-            return None
+        return attempted(minimise, replace(fitted.problem, free=free), point, iterations)
 
     def _exchanged(self, current: Fit) -> Fit | None:
         """Return a better set of terms, with one restored and others removed; else None."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from udd.fitting import Fit, Goal, extend, started_at
 
 from .curve_effects import fit_curve, fit_formula
 from .thresholds import ALPHA
+
+Work = ParamSpec("Work")
+Result = TypeVar("Result")
 
 
 def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
@@ -40,6 +44,14 @@ def wald(fitted: Fit, names: Sequence[str]) -> float:
 def cost_of_parameter(fitted: Fit) -> float:
     """Return the cost of a parameter by the Bayesian information criterion, nats."""
     return math.log(fitted.observations) / 2
+
+
+def attempted(work: Callable[Work, Result], *args: Work.args, **options: Work.kwargs) -> Result | None:
+    """Return a result of the fitter; None if it fails."""
+    try:
+        return work(*args, **options)
+    except FitError:
+        return None
 
 
 @dataclass(frozen=True)
@@ -117,9 +129,9 @@ def of_library(
 
     Return None if the fit fails, or explains less than the `goal` requires.
     """
-    try:
-        fitted = extend(current, [c.effect for c in candidates], start, goal or Goal(current.level))
-    except FitError:
+    effects = [c.effect for c in candidates]
+    fitted = attempted(extend, current, effects, start, goal or Goal(current.level))
+    if fitted is None:
         return None
     names = [name for c in candidates for name in c.amplitude_names]
     cost = cost_of_parameter(fitted) * sum(c.parameters for c in candidates)
@@ -138,11 +150,8 @@ def of_several(
 
 def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | None:
     """Fit a curve in full; return None if that fails, or chi2 stays above `most`."""
-    try:
-        located = fit_curve(current, curve, _unused(current, "curve"), most)
-    except FitError:
-        return None
-    if not located.fit.converged:
+    located = attempted(fit_curve, current, curve, _unused(current, "curve"), most)
+    if located is None or not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)
     return TrialFit([candidate], located.fit, [], located.cost, located.curve)
@@ -151,9 +160,8 @@ def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | N
 def of_formula(current: Fit, curve: Curve, written: Formula, goal: Goal | None = None) -> TrialFit | None:
     """Fit a formula for a curve, all its constants free; None as in :func:`of_library`."""
     name = _unused(current, "formula")
-    try:
-        fitted = fit_formula(current, curve, written, name, goal)
-    except FitError:
+    fitted = attempted(fit_formula, current, curve, written, name, goal)
+    if fitted is None:
         return None
     effect = fitted.model.effects[-1]
     names = [f"{name}.{p}" for p in effect.parameters]

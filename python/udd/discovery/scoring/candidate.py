@@ -34,10 +34,11 @@ class Candidate:
         """Add this effect to the model, with all its amplitudes zero."""
         return model.with_effects((*model.effects, self.effect))
 
-    def amplitude_indices(self, model: Model) -> list[int]:
-        """Return the indices of the amplitudes among the parameters of :meth:`added_to`'s model."""
-        names = list(self.added_to(model).parameters)
-        return [names.index(name) for name in self.amplitude_names]
+    def scored_in(self, model: Model) -> tuple[Model, list[int]]:
+        """Return the model with this effect, and the indices of its amplitudes among the parameters."""
+        added = self.added_to(model)
+        names = list(added.parameters)
+        return added, [names.index(name) for name in self.amplitude_names]
 
     @property
     def parameters(self) -> int:

@@ -137,10 +137,8 @@ class Scan:
 def scan(fit: Fit, candidates: Sequence[Candidate]) -> Scan:
     """Score candidates around a fit."""
     problem, model = fit.problem, fit.model
-    gradient, information, alone = _core.score(
-        problem.at(fit.point),
-        [(c.added_to(model), c.amplitude_indices(model)) for c in candidates],
-    )
+    scored_models = [c.scored_in(model) for c in candidates]
+    gradient, information, alone = _core.score(problem.at(fit.point), scored_models)
     scatter = max(fit.scatter, 1.0)
     scored, columns, first = [], [], 0
     for candidate in candidates:

@@ -118,12 +118,8 @@ def power_for(curve: Curve, observations: int, taken: Collection[str] = ()) -> F
         return None
     target = _Target(curve, observations)
     positive = curve.coordinates[0].name in _POSITIVE
-    trials = []
-    for node, values in powers(curve):
-        fitted = target.fit(without_sign(node) if positive else node, values)
-        if fitted is not None:
-            trials.append(fitted)
-    best = max(trials, key=lambda candidate: candidate.nats, default=None)
+    trials = (target.fit(without_sign(node) if positive else node, values) for node, values in powers(curve))
+    best = max(filter(None, trials), key=lambda candidate: candidate.nats, default=None)
     return None if best is None else _formula(curve, best, taken)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from udd.discovery.hypotheses import log_evidence
 from udd.discovery.thresholds import EVIDENCE_MARGIN
-from udd.errors import FitError
+from udd.discovery.trial_fits import attempted
 from udd.fitting import Fit, extend, most_probable, ran_away, released
 from udd.fitting.parameters import Free, free_parameters
 from udd.fitting.sensor import is_encoder
@@ -55,11 +55,8 @@ def _fixed(fit: Fit) -> tuple[Free, ...]:
 
 def _freed(fitted: Fit, more: tuple[Free, ...]) -> Fit | None:
     """Fit again with the camera free; None if that diverges."""
-    try:
-        freed = released(fitted, (*more, *fitted.problem.free))
-    except FitError:
-        return None
-    return freed if freed.converged and not ran_away(freed) else None
+    freed = attempted(released, fitted, (*more, *fitted.problem.free))
+    return freed if freed and freed.converged and not ran_away(freed) else None
 
 
 def _with_effects(fitted: Fit | None, extended: Fit, kept: tuple[str, ...]) -> Fit | None:
@@ -70,7 +67,4 @@ def _with_effects(fitted: Fit | None, extended: Fit, kept: tuple[str, ...]) -> F
     values = [
         extended.parameters.get(f"{e.name}.{p}", e.parameters[p]) for e in effects for p in e.amplitudes
     ]
-    try:
-        return extend(fitted, effects, values)
-    except FitError:
-        return None
+    return attempted(extend, fitted, effects, values)

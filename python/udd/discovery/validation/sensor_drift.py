@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
+from udd.discovery.nonparametric.bsplines import Spline
 from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.discovery.trial_fits import cost_of_parameter
 from udd.fitting import Fit, eased
@@ -39,7 +39,8 @@ def drift_gain(fit: Fit) -> float:
             number = min(_INTERVALS, int(float(np.ptp(t)) / (_SLOW * slow))) if slow > 0 else 0
             if number < _FEWEST or seen.sum() <= number + 3:
                 continue
-            weighted = _splines(t, number)[seen] / size[seen, None]
+            spline = Spline(float(t[0]), float(t[-1]), number, False)
+            weighted = spline.design(t[seen]) / size[seen, None]
             scaled = misfit[seen] / size[seen]
             remainder = scaled - weighted @ np.linalg.lstsq(weighted, scaled, rcond=None)[0]
             fall = float(scaled @ scaled - remainder @ remainder) / max(fit.scatter, 1.0)
@@ -54,14 +55,6 @@ def _about_its_trend(t: Array, values: Array) -> float:
     level = values - np.polyval(np.polyfit(t - t[0], values, 1), t - t[0])
     (time,) = takes_to_change(level[:, None], (np.diff(level) / np.diff(t))[:, None])
     return float(time)
-
-
-def _splines(t: Array, intervals: int) -> Array:
-    """Evaluate cubic B-splines over a record, (n, intervals + 3)."""
-    inner = np.linspace(t[0], t[-1], intervals + 1)
-    knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
-    result: Array = BSpline.design_matrix(t, knots, 3).toarray()
-    return result
 
 
 FORETELLS = 0.5
