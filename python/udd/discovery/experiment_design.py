@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -69,22 +69,18 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class Film:
-    """Film that could be made.
+    """Film that could be made, from one of several start states, (k, d), which are tried in turn.
 
-    Attributes
-    ----------
-    design : str
-    model : Model
-    start : ndarray (k, d)
-        Possible start states, tried in turn.
-    again : bool
-        True if it continues at the end of the first one, with its camera and drive.
+    It may continue at the end of the first one, with its camera and drive, as if that was filmed for as long
+    `again`. Once it is simulated, `t` and `states` have the motion.
     """
 
     design: str
     model: Model
-    start: Array
+    starts: Array
     again: bool = False
+    t: Array = field(default_factory=lambda: np.zeros(0))
+    states: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def hints(discovery: Discovery) -> list[NextExperiment]:
@@ -124,13 +120,13 @@ def hints(discovery: Discovery) -> list[NextExperiment]:
         return []
     now = [pair.nats(None) for pair in pairs]
 
-    def predicted(film: Film) -> tuple[str, dict[str, float]] | None:
-        filmed = _filmed(discovery.trained, film)
-        if filmed is None:
+    def predicted(planned: Film) -> tuple[str, dict[str, float]] | None:
+        film = _filmed(discovery.trained, planned)
+        if film is None:
             return None
         each: dict[str, float] = {}
         for pair, before in zip(pairs, now, strict=True):
-            nats = pair.other.nats + max(pair.nats((film, filmed)) - before, 0.0)
+            nats = pair.other.nats + max(pair.nats(film) - before, 0.0)
             each[pair.other.title] = float(min(nats, each.get(pair.other.title, np.inf)))
         return film.design, each
 
@@ -174,14 +170,14 @@ def _films(fit: Fit) -> Iterator[Film]:
     yield Film("on for as long again", model, ends, again=True)
 
 
-def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
+def _filmed(fit: Fit, film: Film) -> Film | None:
     """Simulate a film as long as the first one; None if the disk loses contact too soon."""
     first_film = fit.record.film == 0
     frames = int(first_film.sum())
     times = fit.record.t[first_film]
     t = np.median(np.diff(times)) * np.arange(frames)
     longest: Array = np.zeros((0, fit.states.shape[1]))
-    for start in film.start:
+    for start in film.starts:
         try:
             run = integrated(film.model, t + (times[-1] if film.again else 0.0), start, rtol=1e-7, atol=1e-9)
         except UddError:
@@ -191,7 +187,8 @@ def _filmed(fit: Fit, film: Film) -> tuple[Array, Array] | None:
         longest = max(longest, states, key=len)
         if len(longest) == frames:
             break
-    return (t[: len(longest)], longest) if len(longest) >= _SHORTEST * frames else None
+    is_feasible = len(longest) >= _SHORTEST * frames
+    return replace(film, t=t[: len(longest)], states=longest) if is_feasible else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,9 +223,9 @@ class _Pair:
     def _without(self, model: Model) -> Model:
         return model.with_effects([e for e in model.effects if e.name != self.chosen.effect.name])
 
-    def nats(self, more: tuple[Film, tuple[Array, Array]] | None) -> float:
+    def nats(self, film: Film | None) -> float:
         """Compute the forms' expected difference in log likelihood, with or without a further film."""
-        problem, point = self._with(more)
+        problem, point = self._with(film)
         model = problem.models[0]
         forms = [_still(self.chosen), _still(Candidate(self.other.effect, self.other.title))]
         _gradient, information, _alone = _core.score(problem.at(point), [c.scored_in(model) for c in forms])
@@ -239,7 +236,7 @@ class _Pair:
         rises = _rise(information, effects, rival_effects, a), _rise(information, rival_effects, effects, b)
         return 0.5 * min(rises) / max(self.fit.scatter, 1.0)
 
-    def _with(self, further: tuple[Film, tuple[Array, Array]] | None) -> tuple[Problem, Point]:
+    def _with(self, film: Film | None) -> tuple[Problem, Point]:
         """Return the problem without the chosen form and with a further film, at the expected solution."""
         fit, problem = self.fit, self.fit.problem
         models = tuple(self._without(m) for m in fit.models)
@@ -247,13 +244,11 @@ class _Pair:
             FilmParameters(list(m.parameters.values()), camera, clock)
             for m, (_values, camera, clock) in zip(models, fit.point.sets, strict=True)
         ]
-        if further is None:
+        if film is None:
             alone = replace(problem, models=models, free=self.free)
             return alone, Point(fit.states, tuple(sets))
-        film, (t, states) = further
-        number = 0 if film.again else len(models)
-        record = _longer(fit.record, t, states, number)
-        weight = np.concatenate([problem.noise.weight, np.ones(len(t))])
+        record = _longer(fit.record, film.t, film.states, 0 if film.again else len(models))
+        weight = np.concatenate([problem.noise.weight, np.ones(len(film.t))])
         free = self.free
         if not film.again:
             film_model = self._without(film.model)
@@ -262,7 +257,7 @@ class _Pair:
             sets.append(sets[0]._replace(model=list(film_model.parameters.values())))
         noise = replace(problem.noise, weight=weight)
         longer = replace(problem, models=models, record=record, free=free, noise=noise)
-        return longer, Point(np.concatenate([fit.states, states]), tuple(sets))
+        return longer, Point(np.concatenate([fit.states, film.states]), tuple(sets))
 
 
 def _still(candidate: Candidate) -> Candidate:

@@ -24,15 +24,14 @@ def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
     size = float(np.abs(curve.values(np.quantile(x, np.linspace(0.02, 0.98, 50)))).max()) or 1.0
     low, high = (0.0, 2 * np.pi) if spline.periodic else np.quantile(x, (0.01, 0.99))
     span, most = float(high - low), float(np.abs((low, high)).max())
-    texts: list[str] = []
+    # Each with the value of n, a literal.
+    forms: list[tuple[str, float]] = []
     if spline.periodic:
-        for n in range(1, 11):
-            texts += [f"{size} * sin({n}@ * x) + {size} * cos({n}@ * x)"]
-        centres = [low + span * k / 6 for k in range(6)]
-        texts += [f"{size} * exp(2.0 * cos(x - {c}))" for c in centres]
+        forms += [(f"{size} * sin(n * x) + {size} * cos(n * x)", float(n)) for n in range(1, 11)]
+        forms += [(f"{size} * exp(2.0 * cos(x - {low + span * k / 6}))", 0.0) for k in range(6)]
     else:
         powers = [f"{size / most**n} * x^{n}" for n in (1, 2, 3)]
-        texts += [*powers, f"{powers[0]} + {powers[1]}", f"{powers[0]} + {powers[2]}", " + ".join(powers)]
+        texts = [*powers, f"{powers[0]} + {powers[1]}", f"{powers[0]} + {powers[2]}", " + ".join(powers)]
         texts += [f"{size / most} * abs(x)", f"{size / most**2} * x * abs(x)"]
         texts += [f"{size / most**p} * abs(x)^{p}" for p in (0.5, 1.5, 2.5)]
         texts += [f"{size / most ** (1 + p)} * x * abs(x)^{p}" for p in (0.5, 1.5)]
@@ -41,12 +40,13 @@ def usual(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
             centre, w = low + share * span, width * span
             texts += [
                 f"{size} * tanh((x - {centre}) * {1 / w})",
-                f"{size} * exp(-1@ * ((x - {centre}) * {1 / w})^2)",
+                f"{size} * exp(n * ((x - {centre}) * {1 / w})^2)",
             ]
         if curve.coordinates[0].angle:
             texts += [f"{size} * sin({b} * x)" for b in (1.0, 2.0, 3.0)]
-    for text, constant in itertools.product(texts, ("", f" + {size}")):
-        yield _read_fixed(text + constant)
+        forms += [(text, -1.0) for text in texts]
+    for (text, n), constant in itertools.product(forms, ("", f" + {size}")):
+        yield read(text + constant, {"x": X, "n": ("n", n)})
     if not spline.periodic:
         for share in (0.2, 0.4, 0.6):  # zero below a threshold, then proportional
             yield ("*", ("c", 0), ("ramp", ("-", X, ("c", 1)))), [size / span, float(low) + share * span]
@@ -58,16 +58,7 @@ def powers(curve: Curve) -> Iterator[tuple[Node, list[float]]]:
     size = float(np.abs(curve.values(np.quantile(x, (0.1, 0.5, 0.9)))).max()) or 1.0
     most = float(np.abs(np.quantile(x, (0.01, 0.99))).max()) or 1.0
     for exponent in (0.3, 0.7, 1.0, 1.5, 2.0):
-        yield _read_fixed(f"{size / most**exponent} * abs(x)^{exponent}")
-
-
-def _read_fixed(text: str) -> tuple[Node, list[float]]:
-    """Parse a form in which a number followed by @ stays literal."""
-    fixed: dict[str, Node] = {"x": ("x",)}
-    for k in range(-1, 11):
-        fixed[f"fixed_{k + 1}"] = ("n", float(k))
-        text = text.replace(f"({k}@", f"(fixed_{k + 1}")
-    return read(text, fixed)
+        yield read(f"{size / most**exponent} * abs(x)^{exponent}", {"x": X})
 
 
 def regression(curve: Curve, most: int, seed: int) -> list[tuple[Node, list[float]]]:
