@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from udd._util import background_import
 from udd._util.arguments import checked_arguments
@@ -146,7 +145,7 @@ def discover(
             "held_out cannot be used with each, or with priors of single records: "
             "the parameters of a held-out record would be undetermined"
         )
-    given = _given(_first(model), candidates)
+    given = _given(next(iter(model), None) if isinstance(model, (list, tuple)) else model, candidates)
     clock.finish("fitting the known model")
     background_import.importing("scipy.stats", "pyoperon.sklearn")
     part, whole, constrained = known_model_fits(data, options)
@@ -227,11 +226,6 @@ def _answer(
     )
 
 
-def _first(models: Any) -> Any:
-    """Return the first of a list of models, or None if it is empty; a single model is returned unchanged."""
-    return next(iter(models), None) if isinstance(models, (list, tuple)) else models
-
-
 def _begin(search: Search, start: SearchState) -> SearchState:
     """Return the start of the search: the known model's fit, or one with its drive and camera fixed.
 
@@ -243,7 +237,7 @@ def _begin(search: Search, start: SearchState) -> SearchState:
     return attempted(search.tests.refitted, start, as_stated) or start
 
 
-def _given(model: Model, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:
+def _given(model: object, candidates: Iterable[tuple[str, Expression]]) -> list[Candidate]:
     """Make the user's own candidates."""
     listed = list(candidates)
     if isinstance(model, FormulaModel):

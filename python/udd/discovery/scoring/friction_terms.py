@@ -12,7 +12,7 @@ from udd.effects.user_defined import FormulaSpec, written
 from udd.models.formula_model import FormulaModel
 
 from .candidate import ONE_WAY, Candidate
-from .written_laws import BRAKES, EITHER, Shape, laws
+from .written_laws import EITHER, NEGATIVE, Shape, laws
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def load_frictions(model: FormulaModel, states: Array) -> list[Candidate]:
         if joint.angle:
             text = f"({{c}}*cos({joint.x}) + {{d}}*{joint.v}^2)*tanh({joint.v}/{_TURNS * joint.typical:.3g})"
             title = f"dry friction growing with the load in {joint.slot}"
-            result += laws(model, joint.slot, text, title, {"c": BRAKES, "d": BRAKES})
+            result += laws(model, joint.slot, text, title, {"c": NEGATIVE, "d": NEGATIVE})
     return result
 
 
@@ -98,7 +98,7 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
         small = f"{(_ROUND * joint.typical) ** 2:.3g}"
         power = f"{{c}}*({v}^2 + {small})^({{n}}/2)*{v}"
         title, tried = f"power of the speed in {slot}", [(value,) for value in POWERS]
-        result.append(laws(model, slot, power, title, {"c": BRAKES}, {"n": _SIZE}, tried))
+        result.append(laws(model, slot, power, title, {"c": NEGATIVE}, {"n": _SIZE}, tried))
         settling, times = f"{{c}}*exp(-t/{{tau}})*{v}", [(share * duration,) for share in DURATIONS]
         title = f"friction that settles with time in {slot}"
         result.append(laws(model, slot, settling, title, {"c": EITHER}, {"tau": _SIZE}, times))
@@ -111,11 +111,11 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
             for place in places(joint.places, share * span, angle=joint.angle)
         ]
         title = f"friction near a place of {x} in {slot}"
-        result.append(laws(model, slot, local, title, {"c": BRAKES}, {"b": _PLACE, "s": _WIDTH}, where))
+        result.append(laws(model, slot, local, title, {"c": NEGATIVE}, {"b": _PLACE, "s": _WIDTH}, where))
         above = f"(abs({v}) - {{b}})"
         beyond = f"{{c}}*({above} + sqrt({above}^2 + {small}))/2*{v}"
         title, tried = f"drag above a speed in {slot}", [(speed,) for speed in speeds(joint.speeds)]
-        result.append(laws(model, slot, beyond, title, {"c": BRAKES}, {"b": _PLACE}, tried))
+        result.append(laws(model, slot, beyond, title, {"c": NEGATIVE}, {"b": _PLACE}, tried))
     return [listed for listed in result if listed]
 
 

@@ -19,7 +19,7 @@ from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
 from .coordinates import slots
-from .written_laws import BRAKES, DRIVES, EITHER, Range, Shape, laws, unused_names, word_for
+from .written_laws import EITHER, NEGATIVE, POSITIVE, Range, Shape, laws, unused_names, word_for
 
 _DEGREE = 3
 #: Maximum of states and inputs for products of the third degree: 4 have 35 for each equation, 12 would have
@@ -101,9 +101,9 @@ def _machines(model: FormulaModel, along: str) -> list[Candidate]:
     """List forces that machines have, except dry friction, along a coordinate or between two."""
     v, where = _along(model, along)
     listed = [
-        ("viscous friction", f"-{{c}}*{v}", DRIVES),
-        ("quadratic drag", f"-{{c}}*abs({v.strip('()')})*{v}", DRIVES),
-        ("cubic drag", f"-{{c}}*{v}^3", DRIVES),
+        ("viscous friction", f"-{{c}}*{v}", POSITIVE),
+        ("quadratic drag", f"-{{c}}*abs({v.strip('()')})*{v}", POSITIVE),
+        ("cubic drag", f"-{{c}}*{v}^3", POSITIVE),
     ]
     if along.split(" - ")[0] in model.angles:
         listed += [(f"{wave}({along})", f"{{c}}*{wave}({along})", EITHER) for wave in ("sin", "cos")]
@@ -114,7 +114,7 @@ def _machines(model: FormulaModel, along: str) -> list[Candidate]:
     result = []
     for kind, text, limits in listed:
         (candidate,) = laws(model, f"force({along})", text, f"{kind} {where}", {"c": limits})
-        result.append(replace(candidate, form=kind if limits is DRIVES else ""))
+        result.append(replace(candidate, form=kind if limits is POSITIVE else ""))
     return result
 
 
@@ -156,7 +156,7 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
     size = model.rates(0.0, states) if moving else states
     columns = {name: size[:, model.state_names.index(name)] for name in moving}
     speeds = [
-        (text, _said(rates, name), values)
+        (text, rates.get(name, f"{name}'"), values)
         for (name, text), values in zip(moving.items(), columns.values(), strict=True)
     ]
     for a, b in itertools.combinations(rates, 2):
@@ -169,7 +169,7 @@ def dry(model: FormulaModel, states: NDArray[np.float64]) -> list[Candidate]:
             continue
         for text, said, values in speeds:
             # The friction of another body may drive this one.
-            limits = BRAKES if text == state else EITHER
+            limits = NEGATIVE if text == state else EITHER
             name, title = f"dry_{word_for(said)}_in_{state}", f"dry friction of {said} in {state}'"
             inner = text if text.isidentifier() else f"({text})"
             result += _turning(model, f"{state}'", f"tanh({inner}/{{eps}})", name, title, values, limits)
@@ -183,8 +183,8 @@ _BEYOND = "(max({x} - {b}, 0) + min({x} + {b}, 0))"
 _SMOOTH = ("saturation", "tanh({x}/{b})", EITHER)
 _IN_PLACE = (("dead zone", _BEYOND, EITHER), _SMOOTH)
 _IN_INPUT = (
-    ("dead zone", "min(max({x}, -{b}), {b})", BRAKES),
-    ("limit", _BEYOND, BRAKES),
+    ("dead zone", "min(max({x}, -{b}), {b})", NEGATIVE),
+    ("limit", _BEYOND, NEGATIVE),
     _SMOOTH,
 )
 
@@ -224,14 +224,9 @@ def _dry_forces(model: FormulaModel, states: NDArray[np.float64]) -> list[Candid
         columns = [states[:, model.state_names.index(model.speeds[x])] for x in along.split(" - ")]
         name, title = word_for(f"dry {where}"), f"dry friction {where}"
         speed, term = reduce(np.subtract, columns), f"tanh({v}/{{eps}})"
-        listed = _turning(model, f"force({along})", term, name, title, speed, BRAKES)
+        listed = _turning(model, f"force({along})", term, name, title, speed, NEGATIVE)
         result += [replace(c, form="dry") for c in listed]
     return result
-
-
-def _said(rates: dict[str, str], name: str) -> str:
-    """Return the name of a state's rate for a reader."""
-    return rates.get(name, f"{name}'")
 
 
 def _typical(values: NDArray[np.float64]) -> float:

@@ -17,8 +17,8 @@ from .candidate import Candidate
 Range = tuple[float, float]
 
 EITHER: Range = (-np.inf, np.inf)
-DRIVES: Range = (0.0, np.inf)
-BRAKES: Range = (-np.inf, 0.0)
+POSITIVE: Range = (0.0, np.inf)
+NEGATIVE: Range = (-np.inf, 0.0)
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Shape:
 
     role: str
     grid: tuple[float, ...]
-    range: Range = DRIVES
+    range: Range = POSITIVE
 
 
 def laws(
