@@ -280,7 +280,7 @@ class Search:
     def _replaced(
         self, path: SearchPath, k: int, trials: list[TrialFit], reestimate_noise: bool = False
     ) -> bool:
-        """Put the best trial in the place of all steps from a number on; return True if that is better."""
+        """Replace all steps from number k on by the best trial; return True if that is better."""
         replacement = self.tests.best(path.states[k], trials, path.rounds[k])
         if replacement is None:
             return False

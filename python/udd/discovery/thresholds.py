@@ -9,7 +9,7 @@ from typing import Literal
 ALPHA = 1e-3
 #: Difference in log evidence (nats) below which explanations are not distinguished.
 EVIDENCE_MARGIN = 10.0
-#: The same if a score, or a fit of a part of the data, stands for the evidence.
+#: The same for scores, and for fits of a part of the data.
 ROUGH_MARGIN = 3 * EVIDENCE_MARGIN
 #: Likeness above which forms act identically on the data, such as a slip c Z and a relaxation -b W Z at
 #: one drive.

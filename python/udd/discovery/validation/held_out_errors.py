@@ -375,7 +375,7 @@ def _shown(fit: Fit, record: Record) -> Array | float:
 
 
 def _observed(record: Record, frames: NDArray[np.int64]) -> Array:
-    """Return the observations of frames; NaN if there is none."""
+    """Return the observations of frames; NaN if not observed."""
     result: Array = np.where(record.observed[frames], record.seen[frames], np.nan)
     return result
 
