@@ -158,7 +158,7 @@ def _thinned(
     measurement: Measurement | Sequence[Measurement], model: Model | Sequence[Model]
 ) -> list[Thinned]:
     """Thin measurements that were sampled faster than their motion requires."""
-    some = list(measurement) if isinstance(measurement, (list, tuple)) else [measurement]
+    some: list[Any] = list(measurement) if isinstance(measurement, (list, tuple)) else [measurement]
     if not some or not all(isinstance(part, Measurement) for part in some):
         record_of(measurement, model)  # which raises the error
     return [thinned(part) for part in some]

@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 
 def needed_in(fitted: Fit, names: Sequence[str]) -> bool:
     """Return True if an effect's amplitudes are significant with everything else free (Wald's test)."""
-    return wald(fitted, names) / fitted.shown >= chi_squared.isf(ALPHA, len(names))
+    return bool(wald(fitted, names) / fitted.shown >= chi_squared.isf(ALPHA, len(names)))
 
 
 def wald(fitted: Fit, names: Sequence[str]) -> float:

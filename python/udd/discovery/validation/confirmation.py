@@ -78,7 +78,8 @@ def _expected(part: Fit, whole: Pair, names: Sequence[str]) -> float:
 
     def information(fit: Fit) -> Array:
         indices = [list(fit.parameters).index(name) for name in names]
-        result: Array = np.linalg.pinv(fit.covariance[np.ix_(indices, indices)], hermitian=True)
+        covariance = fit.covariance[np.ix_(indices, indices)]
+        result: Array = np.asarray(np.linalg.pinv(covariance, hermitian=True), dtype=np.float64)
         return result
 
     size = np.array([part.parameters[name] for name in names])
