@@ -65,17 +65,23 @@ class Proposals:
 
         Curves over the coordinates that score about as well are located too, with their formulas.
         """
-        passing = self.scores.passing()
-        trials = self._singles(passing)
+        trials = self._singles(self.scores.passing())
         trials += self._look_alikes(trials)
-        # With `loose` effects the model error cannot even be reduced as far as without them, nor with a
-        # second effect.
-        tight = [t for t in trials if t.fit.level >= self.fit.level]
-        loose = {t.candidates[0].effect.name for t in trials} - {t.candidates[0].effect.name for t in tight}
         if trials:
+            tight = [t for t in trials if t.fit.level >= self.fit.level]
+            loose = self._loose(trials)
             trials += self.curves(self._near_curves(), far_behind(tight))
             trials += self._pairs(loose, tight)
         return trials
+
+    def _loose(self, trials: Sequence[TrialFit]) -> set[str]:
+        """Name effects with which the model error cannot even be reduced as far as without them.
+
+        With a second effect it cannot be reduced either.
+        """
+        singles = [t for t in trials if len(t.candidates) == 1]
+        tight = {t.candidates[0].effect.name for t in singles if t.fit.level >= self.fit.level}
+        return {t.candidates[0].effect.name for t in singles} - tight
 
     def _near_curves(self) -> list[Curve]:
         """Return the most probable curves, over each coordinate that scores about as well as the best.
@@ -93,13 +99,16 @@ class Proposals:
         kinds = list(dict.fromkeys(c.key_without_momentum for c in likely))[:_COORDINATES]
         return [c for c in likely if c.key_without_momentum in kinds]
 
-    def only_together(self) -> tuple[list[TrialFit], int]:
-        """Fit pairs of effects that may pass only together; also count all pairs."""
+    def only_together(self, trials: Sequence[TrialFit]) -> tuple[list[TrialFit], int]:
+        """Fit pairs of effects that may pass only together, without those of `trials`; count all pairs."""
         best, number = self.scores.library.pairs(_TOGETHER)
+        loose = self._loose(trials)
+        tried = [{c.effect.name for c in t.candidates} for t in trials]
         likely = [
             [s.candidate for s in group]
             for group, fall in best
-            if len({s.candidate.effect.name for s in group}) == 2
+            if len(names := {s.candidate.effect.name for s in group} - loose) == 2
+            and names not in tried
             and fall > self.scores.fit.film_error_chi2
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]

@@ -194,10 +194,9 @@ class Search:
     def _addition(
         self, current: SearchState, scores: ScoreRound, with_more: bool
     ) -> tuple[Step, SearchState] | None:
-        """Return the best passing addition: effects of the library, one or two, or a curve.
+        """Return the best passing addition: effects of the library with likely curves, else two together.
 
-        If no single effect of the library can be fitted, pairs that pass only together are tried, then
-        curves.
+        A curve that leads comes first. If no effect of the library passes its score, curves come last.
         """
         # A curve that clearly beats every library term cannot be a biased view of one if the library was
         # tried before or the effect is strong. For a machine it can, because its library has most terms of
@@ -207,11 +206,13 @@ class Search:
         if leads and (located := self._located(current, scores)):
             return located
         proposals = Proposals(current.part, scores, self.clock)
-        if trials := proposals.effects():
-            return self.tests.best(current, trials, scores)
-        together, number = proposals.only_together()
-        pair = self.tests.best(current, together, replace(scores, comparisons=number))
-        return pair or (None if leads else self._located(current, scores))
+        trials = proposals.effects()
+        if addition := self.tests.best(current, trials, scores):
+            return addition
+        together, number = proposals.only_together(trials)
+        if pair := self.tests.best(current, together, replace(scores, comparisons=number)):
+            return pair
+        return None if leads or trials else self._located(current, scores)
 
     def _located(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
         """Return the best passing curve."""
