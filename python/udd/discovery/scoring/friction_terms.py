@@ -17,7 +17,7 @@ from .written_laws import EITHER, NEGATIVE, Shape, laws
 Array = NDArray[np.float64]
 
 #: Powers of the speed in the friction coefficient that a scan tries: 1 is quadratic drag, 2 a cubic one.
-POWERS = (0.2, 0.4, 0.7, 1.4, 1.7, 2.5)
+POWERS = (-0.7, -0.4, -0.2, 0.2, 0.4, 0.7, 1.4, 1.7, 2.5)
 #: Settling times of friction, in units of the record's length.
 DURATIONS = (0.02, 0.05, 0.12, 0.3, 0.7)
 _WIDTHS = (0.06, 0.15, 0.4)  # share of the visited range
