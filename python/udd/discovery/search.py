@@ -196,7 +196,7 @@ class Search:
     ) -> tuple[Step, SearchState] | None:
         """Return the best passing addition: effects of the library with likely curves, else two together.
 
-        A curve that leads comes first. If no effect of the library passes its score, curves come last.
+        A curve that leads comes first; otherwise curves come last.
         """
         # A curve that clearly beats every library term cannot be a biased view of one if the library was
         # tried before or the effect is strong. For a machine it can, because its library has most terms of
@@ -212,7 +212,8 @@ class Search:
         together, number = proposals.only_together(trials)
         if pair := self.tests.best(current, together, replace(scores, comparisons=number)):
             return pair
-        return None if leads or trials else self._located(current, scores)
+        # Without this a string's drag is lost, whose best form in the training part fails a test.
+        return None if leads else self._located(current, scores)
 
     def _located(self, current: SearchState, scores: ScoreRound) -> tuple[Step, SearchState] | None:
         """Return the best passing curve."""
