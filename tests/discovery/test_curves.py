@@ -8,13 +8,12 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import udd
 import unmodelled
 from udd import _core
 from udd.discovery.curve_effects import fit_curve, fit_formula
-from udd.discovery.nonparametric.bsplines import Spline, along
+from udd.discovery.nonparametric.bsplines import Spline, along, product, rough_product
 from udd.discovery.nonparametric.confounding import confounded_directions, identifiable_part
 from udd.discovery.nonparametric.curve_scan import refined, scan_curves
 from udd.discovery.nonparametric.penalized_curves import chance, smooth
@@ -137,9 +136,15 @@ def test_the_form_of_a_bump_of_an_angle_is_named():
     assert power_for(curve, 4500) is None
 
 
+def test_a_law_of_two_coordinates_is_located():
+    law = lambda t, o, y, z, b: (6 * y * z, 0.0, 0.0)  # noqa: E731
+    fit = udd.fit(unmodelled.record(law, 1), udd.Disk(W))
+    assert scan_curves(fit, pairs=True).curves[0].name == ("torque", "Y", "Z")
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_nothing_is_located_where_nothing_is_missing(seed):
-    result = scan_curves(udd.fit(unmodelled.record(None, seed, 40.0), udd.Disk(W)))
+    result = scan_curves(udd.fit(unmodelled.record(None, seed, 40.0), udd.Disk(W)), pairs=True)
     assert min(c.p for c in result.curves) * result.comparisons > 1e-2
     assert result.curves[0].evidence < 0  # no curve is more likely than any
 
@@ -237,51 +242,16 @@ def test_forcings_score_as_the_effects_of_the_library(null):
         assert score.gradient[0] == pytest.approx(gradient[0] / scale, abs=0.01 * error)
 
 
-@pytest.mark.parametrize(
-    ("model", "spread"),
-    [(udd.Disk(W), [4.0, 0.02, 0.02, 3.0]), (udd.Pendulum(0.6, inertia=0.4, k0=0.01), [4.0, 1.0])],
-    ids=["disk", "pendulum"],
-)
-def test_coordinates_change_as_they_are_said_to(model, spread):
-    x = np.random.default_rng(1).normal(0, spread, (40, len(spread)))
+def test_coordinates_change_as_they_are_said_to():
+    model = udd.Disk(W)
+    x = np.random.default_rng(1).normal(0, [4.0, 0.02, 0.02, 3.0], (40, 4))
     rates, step = model.rates(0.0, x), 1e-7
     for item in coordinates(model):
         ahead = item.of(np.full(40, step), x + step * rates)
         back = item.of(np.full(40, -step), x - step * rates)
         np.testing.assert_allclose((ahead - back) / (2 * step), item.rate(x, rates), rtol=1e-4, atol=1e-4)
-    with pytest.raises(FitError, match="a function of Omega, "):
+    with pytest.raises(FitError, match="a function of Omega, Y, Z"):
         coordinate(model, "X")
-
-
-def test_the_load_on_a_pivot_is_the_force_along_the_rod():
-    model = udd.Pendulum(0.6, inertia=0.4)
-    x = np.random.default_rng(4).normal(0, [4.0, 1.0], (20, 2))
-    item = coordinate(model, "load")
-    # The centre of mass moves on a circle; the part of its acceleration along the rod is length Omega^2.
-    force = model.g * np.cos(x[:, 1]) + 0.6 * x[:, 0] ** 2
-    np.testing.assert_allclose(item.of(np.zeros(20), x), force / model.g - 1, rtol=1e-12)
-    effect = E.formula("friction", f"a * {item.text}", a=1e-3)
-    braked = model.with_effects([effect]).rates(0.0, x)[:, 0] - model.rates(0.0, x)[:, 0]
-    np.testing.assert_allclose(braked, -1e-3 * (force / model.g - 1) * x[:, 0] / 0.4, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(2, 5))]
-)
-def test_friction_by_the_load_on_a_pivot_is_a_rival_of_cubic_drag(seed):
-    # Over a swing of a radian the two differ by less than ten nats; "cubic drag" was called identified.
-    def rates(_t, s):
-        brake = 0.012 + 0.006 * (np.cos(s[1]) + 0.6 * s[0] ** 2 / 9.81)
-        return [-(9.81 * 0.6 * np.sin(s[1]) + brake * s[0]) / 0.36, s[0]]
-
-    rng = np.random.default_rng(seed)
-    t = np.arange(0, 60, 1 / 30)
-    theta = solve_ivp(rates, (0, 60), [0.0, rng.uniform(0.9, 1.2)], "DOP853", t, rtol=1e-9, atol=1e-11).y[1]
-    measured = udd.Measurement(t, {"theta": theta + 5e-3 * rng.standard_normal(len(t))})
-    result = udd.discover(measured, udd.Pendulum(0.6, k0=0.012), progress=False)
-    assert result.verdict == "effect present, form not identified"
-    named = [effect.title for effect in (*result.effects, *result.alternatives)]
-    assert any("cos(theta) + length*Omega^2/g" in title for title in named)
 
 
 @pytest.mark.parametrize("spline", [Spline(-1.0, 2.0, 7, False), Spline(0.0, 2 * np.pi, 9, True)])
@@ -316,6 +286,16 @@ def test_an_angle_that_does_not_go_round_has_ends():
     turned = np.mod(x, 2 * np.pi) - np.pi
     assert along(turned[abs(turned + 1) > 1], True, 12).periodic
     assert not along(turned[abs(turned) < 2.5], True, 12).periodic
+
+
+def test_surfaces_are_products():
+    a, b = Spline(0.0, 1.0, 3, False), Spline(0.0, 2 * np.pi, 5, True)
+    x, y = np.random.default_rng(4).uniform(0, 1, (2, 20))
+    coefficients = np.outer(np.arange(a.size), np.ones(b.size)).ravel()
+    np.testing.assert_allclose(
+        product(a.design(x), b.design(y)) @ coefficients, a.design(x) @ np.arange(a.size)
+    )
+    assert np.abs(rough_product(a, b) @ coefficients).max() < 1e-12
 
 
 def _regression(seed: int, curve, noise: float = 0.3, n: int = 400) -> tuple[Spline, np.ndarray, Score]:
@@ -557,6 +537,32 @@ def test_one_law_takes_the_place_of_several_that_come_near_it():
     assert np.sqrt(np.mean(off**2)) < 2
     k = result.error_after.horizons.index(1.0)
     assert result.error_after.median[k] < 1.3 * result.error_after.floor[k]  # known to some 10 % each
+
+
+def test_a_surface_is_added_and_refitted():
+    law = lambda t, o, y, z, b: (6 * y * z, 0.0, 0.0)  # noqa: E731
+    base = udd.fit(unmodelled.record(law, 1), udd.Disk(W))
+    result = scan_curves(
+        base,
+        pairs=True,
+        only=lambda slot, each: slot.name == "torque" and [c.name for c in each] == ["Y", "Z"],
+    )
+    located = fit_curve(base, result.curves[0], "surface")
+    assert located.fit.converged
+    # chi2 is no criterion: the plain model needs a larger model error, with which any model fits.
+    assert located.fit.evidence > base.evidence + 200
+    # Where the record has been the surface is the law, but for what a torque over Y or over Z alone could do
+    # as well (friction, a pivot that is off): the mixed second difference is left.
+    y, z = np.meshgrid([-0.015, 0.015], [-0.02, 0.01], indexing="ij")
+    mixed = np.diff(np.diff(located.curve.values(y, z), axis=0), axis=1).item()
+    assert mixed == pytest.approx(6 * 0.03 * 0.03, rel=0.25)
+    # The effect says what the curve says.
+    effect = located.effect
+    state = np.array([1.0, 0.012, -0.017, 0.4])
+    with_it = udd.Disk(W, effects=[effect])
+    inertia = with_it.R**2 / 2 + state[1] ** 2 + state[2] ** 2
+    change = with_it.rates(0.0, state)[0] - udd.Disk(W).rates(0.0, state)[0]
+    assert change * inertia == pytest.approx(located.curve.values(state[1], state[2]), rel=1e-9)
 
 
 def test_a_velocity_is_scored_with_its_momentum_and_without():

@@ -299,7 +299,7 @@ class Acceptance:
         formulas = formulas_for(curve, number, taken=taken)[:_FORMULAS]
         name = curve.coordinates[0].name
         # The library has powers of the speed.
-        if name in (curve.slot.equation, f"|{curve.slot.equation}|"):
+        if len(curve.coordinates) > 1 or name in (curve.slot.equation, f"|{curve.slot.equation}|"):
             return formulas
         power = power_for(curve, number, taken)
         return [*formulas, power] if power is not None else formulas

@@ -57,7 +57,7 @@ class CurveFit(OneLine):
 
 
 def curve_effect(curve: Curve, name: str = "curve") -> Effect:
-    """Make an effect from a curve.
+    """Make an effect from a curve, or from a surface.
 
     Parameters
     ----------
@@ -65,10 +65,21 @@ def curve_effect(curve: Curve, name: str = "curve") -> Effect:
     name : str
         Prefix of its parameters' names.
     """
-    (spline,), (coordinate,) = curve.splines, curve.coordinates
+    spline, last = curve.splines[0], curve.splines[-1]
+    if len(curve.coordinates) == 2:
+        return effects.surface(
+            curve.slot.name,
+            (curve.coordinates[0].text, curve.coordinates[1].text),
+            (spline.low, last.low),
+            (spline.high, last.high),
+            curve.coefficients.reshape(spline.size, last.size),
+            periodic=last.periodic,
+            momentum=curve.slot.momentum,
+            name=name,
+        )
     return effects.curve(
         curve.slot.name,
-        coordinate.text,
+        curve.coordinates[0].text,
         spline.low,
         spline.high,
         curve.coefficients,

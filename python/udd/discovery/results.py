@@ -186,7 +186,7 @@ class RejectedEffect(OneLine):
         Name for a reader.
     chi2, p : float
         Decrease in chi2, in units of the remaining misfit at the same frequencies, and its probability by
-        chance. All candidates and curves are counted.
+        chance. All candidates, curves and surfaces are counted.
     errors : Errors
         Held-out errors of the model with it.
     ratio : tuple of float

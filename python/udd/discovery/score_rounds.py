@@ -68,7 +68,7 @@ class ScoreRound:
 
     def curve_leads(self) -> bool:
         """Return True if a curve over one coordinate gains far more than every effect of the library."""
-        best = max((c.evidence for c in self.curves), default=0.0)
+        best = max((c.evidence for c in self.curves if len(c.coordinates) == 1), default=0.0)
         leads = _LEADS_OFF_TRACK if self.off_track else _LEADS
         return best > leads * max(self._library_gain(), 0.0) + EVIDENCE_MARGIN
 
@@ -111,6 +111,13 @@ def score_round(
     return replace(
         max(rounds, key=ScoreRound.strongest), comparisons=sum(entry.comparisons for entry in rounds)
     )
+
+
+def with_surfaces(scores: ScoreRound) -> ScoreRound:
+    """Add the scores of surfaces over two coordinates."""
+    surfaces = scan_curves(scores.fit, only=lambda _slot, coords: len(coords) == 2, pairs=True)
+    curves = sorted(scores.curves + surfaces.curves, key=lambda c: -c.evidence)
+    return replace(scores, curves=curves, comparisons=scores.comparisons + surfaces.comparisons)
 
 
 def most_probable_first(curves: list[Curve]) -> list[Curve]:

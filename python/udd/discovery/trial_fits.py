@@ -150,7 +150,8 @@ def of_several(
 
 def of_curve(current: Fit, curve: Curve, most: float = math.inf) -> TrialFit | None:
     """Fit a curve in full; return None if that fails, or chi2 stays above `most`."""
-    located = attempted(fit_curve, current, curve, _unused(current, "curve"), most)
+    kind = "curve" if len(curve.coordinates) == 1 else "surface"
+    located = attempted(fit_curve, current, curve, _unused(current, kind), most)
     if located is None or not located.fit.converged:
         return None
     candidate = Candidate(located.effect, curve.title)

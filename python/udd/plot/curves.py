@@ -1,4 +1,4 @@
-"""A curve that an equation lacks, with its error, where the data are, and formulas for it."""
+"""A curve or a surface that an equation lacks, with its error, where the data are, and formulas for it."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ _COORDINATES: dict[str, tuple[str, str, float]] = {
 }
 _COLOURS = (BEFORE, FLOOR, ALIKE)
 _PLACES = 300
+_ACROSS = 60  # along each coordinate of a surface
 
 
 @checked_arguments(error=UddError)
@@ -39,10 +40,12 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     """Draw the missing term of an equation as a function of a coordinate, with its 95 % band.
 
     The band covers the range of the record; marks at the bottom show how often the record visits each place.
+    A surface is drawn in colours, with the places of the record; within the hatched parts it may be zero.
 
     Parameters
     ----------
     curve : Curve
+        Curve over one coordinate, or over two.
     ax : Axes, optional
     formulas : sequence of Formula
         At most three, drawn for comparison; each may use the model's other parameters to the same degree.
@@ -59,6 +62,8 @@ def curve(curve: Any, ax: Axes | None = None, *, formulas: Sequence[Any] = ()) -
     """
     require(curve, "a curve of a scan can be drawn", "coefficients", "slot")
     ax = new_axes(ax)
+    if len(curve.coordinates) == 2:
+        return _surface(curve, ax)
     label, across = _axis(curve.coordinates[0].name)
     said, up = _value(curve)
     places, x = _range(curve, 0, _PLACES)
@@ -117,3 +122,31 @@ def _range(curve: Any, k: int, number: int) -> tuple[Array, Array]:
     places = np.mod(curve.places[k], 2 * np.pi) if curve.splines[k].periodic else curve.places[k]
     low, high = np.quantile(places, (0.002, 0.998))
     return places, np.linspace(low, high, number)
+
+
+def _surface(curve: Any, ax: Axes) -> Axes:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import MaxNLocator
+
+    (first_visited, x), (second_visited, y) = (_range(curve, k, _ACROSS) for k in (0, 1))
+    (first, by), (second, times) = (_axis(c.name) for c in curve.coordinates)
+    said, up = _value(curve)
+    grid = np.meshgrid(x, y, indexing="ij")
+    value, error = up * curve.values(*grid), up * curve.errors(*grid)
+    most = float(np.abs(value).max())
+    levels = MaxNLocator(20, symmetric=True).tick_values(-most, most)
+    shown = ax.contourf(by * grid[0], times * grid[1], value, levels, cmap="RdBu_r")
+    doubtful = np.abs(value) < 1.96 * error
+    ax.contourf(by * grid[0], times * grid[1], doubtful, [0.5, 1.5], colors="none", hatches=["///"])
+    ax.plot(by * first_visited, times * second_visited, ".", color=MEASURED, markersize=1.5, alpha=0.4)
+    ax.figure.colorbar(shown, ax=ax, label=said)
+    unsure = Patch(facecolor="none", edgecolor="black", hatch="///", label="0 lies in the 95 % band")
+    been = Line2D([], [], color=MEASURED, linestyle="", marker=".", markersize=4, label="the record")
+    legend_above(ax, [unsure, been], [str(unsure.get_label()), str(been.get_label())])
+    ax.set_xlabel(first)
+    ax.set_ylabel(second)
+    ax.set_xlim(by * x[0], by * x[-1])
+    ax.set_ylim(times * y[0], times * y[-1])
+    tidy(ax)
+    return ax

@@ -284,7 +284,9 @@ def reasons(discovery: Discovery) -> tuple[Part, ...]:
 
 
 def _tried(discovery: Discovery) -> Section:
-    smooth = ", and so were smooth curves in every equation" if tables.curves(discovery, 0) else ""
+    smooth = (
+        ", and so were smooth curves and surfaces in every equation" if tables.curves(discovery, 0) else ""
+    )
     rule = (
         "A candidate was added only if chance would rarely do as well (less than 0.1 % over all candidates "
         "together), if its parameters are physical, and if the held-out data confirm it."

@@ -106,8 +106,8 @@ def _tried(discovery: Discovery) -> Section:
         "the held-out data must confirm the candidate."
     )
     said = (
-        "Terms made of the states were tried in every equation, and so were waves of every frequency, and "
-        f"smooth curves. {rule}"
+        "Terms made of the states were tried in every equation, and so were waves of every frequency, smooth "
+        f"curves and surfaces. {rule}"
     )
     caption = "The missing term as a curve, estimated from the data without a formula, with its 95 % band."
     drawn = [

@@ -84,3 +84,15 @@ def along(x: Array, angle: bool, intervals: int) -> Spline:
             return Spline(0.0, 2 * np.pi, intervals, True)
     margin = 0.02 * (high - low)
     return Spline(low - margin, high + margin, intervals, False)
+
+
+def product(a: Array, b: Array) -> Array:
+    """Multiply every column of one design by every column of another."""
+    result: Array = (a[..., :, None] * b[..., None, :]).reshape(*a.shape[:-1], -1)
+    return result
+
+
+def rough_product(a: Spline, b: Spline) -> Array:
+    """Return the roughness matrix of a surface, summed over both directions."""
+    result: Array = np.kron(a.roughness, np.eye(b.size)) + np.kron(np.eye(a.size), b.roughness)
+    return result

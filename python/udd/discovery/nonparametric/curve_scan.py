@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,17 +16,18 @@ from udd.discovery.scoring.coordinates import Slot, coordinates, slots
 from udd.discovery.scoring.forcing import Responses, Score, responses, score_forcings
 from udd.discovery.thresholds import EVIDENCE_MARGIN
 from udd.fitting import Fit
+from udd.models import Model
 from udd.models.profile import Coordinate
 
-from .bsplines import Spline, along
+from .bsplines import Spline, along, product, rough_product
 from .penalized_curves import Confounding, chance, smooth
 
 Array = NDArray[np.float64]
 
-#: Intervals between knots along a coordinate.
-INTERVALS = 14
+#: Intervals between knots along one coordinate, and along each of two.
+INTERVALS, INTERVALS_OF_TWO = 14, 3
 #: The same along a periodic angle: it resolves five waves per turn.
-ROUND = 24
+ROUND, ROUND_OF_TWO = 24, 6
 _FINER = 2  # factor in the number of knots for the curve that is kept
 _FEW = 6  # best curves, which are also tried with the momentum that goes with them
 
@@ -113,8 +115,8 @@ class Curve(OneLine):
 
     def design(self, *x: Array) -> Array:
         """Evaluate the basis functions at places, (..., k)."""
-        ((spline, values),) = zip(self.splines, x, strict=True)
-        return spline.design(np.asarray(values, dtype=np.float64))
+        designs = [s.design(np.asarray(v, dtype=np.float64)) for s, v in zip(self.splines, x, strict=True)]
+        return designs[0] if len(designs) == 1 else product(*designs)
 
     def values(self, *x: Array) -> Array:
         """Evaluate the curve at places, in the slot's unit."""
@@ -142,7 +144,7 @@ class Curve(OneLine):
     @property
     def roughness(self) -> Array:
         """Matrix of the smoothness prior."""
-        return self.splines[0].roughness
+        return _roughness(self.splines)
 
 
 @dataclass(frozen=True)
@@ -156,13 +158,15 @@ class CurveScan:
 def scan_curves(
     fit: Fit,
     *,
+    pairs: bool = False,
     only: Callable[[Slot, tuple[Coordinate, ...]], bool] | None = None,
 ) -> CurveScan:
     """Score a smooth curve in every equation as a function of every coordinate.
 
     The score is computed around the fit, with everything else optimal. Curves are cubic B-splines with a
     prior on their second differences, whose precision is chosen by evidence. Confounding with the free
-    parameters is accounted for. `only` filters the curves to try.
+    parameters is accounted for. With `pairs` surfaces over two coordinates are scored, too; `only` filters
+    the curves to try.
 
     Examples
     --------
@@ -184,7 +188,7 @@ def scan_curves(
     groups = [
         (slot, coords)
         for slot in slots(fit.model)
-        for coords in ((c,) for c in coordinates(fit.model))
+        for coords in _choices(fit.model, pairs)
         if _sensible(slot, coords) and (only is None or only(slot, coords))
     ]
     # A velocity of the contact scores nearly the same with and without its momentum: only if the first is
@@ -237,12 +241,12 @@ def score_splines(
 def refined(curve: Curve, fit: Fit) -> Curve:
     """Refit the curve on finer knots, so that only the smoothness prior limits its curvature.
 
-    It covers the range of the fit's data.
+    It covers the range of the fit's data. A surface keeps its knots.
     """
     moved = responses(fit)
-    finer = tuple(
-        replace(spline, intervals=_FINER * spline.intervals) for spline in _splines(moved, curve.coordinates)
-    )
+    finer = _splines(moved, curve.coordinates)
+    if len(finer) == 1:
+        finer = (replace(finer[0], intervals=_FINER * finer[0].intervals),)
     (score,) = score_splines(moved, [curve.slot], curve.coordinates, finer)
     return _curve(moved, curve.slot, curve.coordinates, finer, score)
 
@@ -256,16 +260,33 @@ def rescored(curve: Curve, fit: Fit, at: Array) -> Curve:
     return replace(curve, **vars(smoothed), score=moved, absorbed=None)
 
 
+def _choices(model: Model, pairs: bool) -> Iterable[tuple[Coordinate, ...]]:
+    """Yield the coordinates, and pairs of independent ones."""
+    single = coordinates(model)
+    yield from ((c,) for c in single)
+    if not pairs:
+        return
+    made_of = {"|Omega|": {"Omega"}, "R": {"Y", "Z"}, "theta": {"Y", "Z"}, "load": {"Omega", "Y", "Z"}}
+    for a, b in itertools.combinations((c for c in single if c.name != "t"), 2):
+        parts = [made_of.get(c.name, {c.name}) for c in (a, b)]
+        if not parts[0] & parts[1]:
+            # A periodic coordinate comes last: a surface can be periodic along its second coordinate.
+            yield (b, a) if a.angle else (a, b)
+
+
 def _sensible(slot: Slot, coords: tuple[Coordinate, ...]) -> bool:
-    """Return False for a curve equivalent to another: friction over Omega is a torque over it."""
-    return not (slot.name == "friction" and any(c.name == "Omega" for c in coords))
+    """Return False for a curve equivalent to another, and for a torque that is no friction but has a load."""
+    names = {c.name for c in coords}
+    # Without this a torque over the load replaces the drag of a string pendulum.
+    return not ((slot.name == "friction" and "Omega" in names) or (slot.name == "torque" and "load" in names))
 
 
 def _splines(moved: Responses, coords: tuple[Coordinate, ...]) -> tuple[Spline, ...]:
+    straight, round_ = (INTERVALS, ROUND) if len(coords) == 1 else (INTERVALS_OF_TWO, ROUND_OF_TWO)
     result = []
     for c in coords:
-        spline = along(moved.along(c)[moved.linked], c.angle, ROUND)
-        result.append(spline if spline.periodic else replace(spline, intervals=INTERVALS))
+        spline = along(moved.along(c)[moved.linked], c.angle, round_)
+        result.append(spline if spline.periodic else replace(spline, intervals=straight))
     return tuple(result)
 
 
@@ -273,9 +294,12 @@ def _designs(
     moved: Responses, coords: tuple[Coordinate, ...], splines: tuple[Spline, ...]
 ) -> tuple[Array, Array]:
     """Evaluate the basis functions at the places of every link, and their rates of change."""
-    ((spline, c),) = zip(splines, coords, strict=True)
-    x = moved.along(c)
-    return spline.design(x), spline.design(x, 1) * moved.speed(c)[..., None]
+    x = [moved.along(c) for c in coords]
+    values = [s.design(v) for s, v in zip(splines, x, strict=True)]
+    changes = [s.design(v, 1) * moved.speed(c)[..., None] for s, v, c in zip(splines, x, coords, strict=True)]
+    if len(coords) == 1:
+        return values[0], changes[0]
+    return product(*values), product(changes[0], values[1]) + product(values[0], changes[1])
 
 
 def _curve(
@@ -285,7 +309,7 @@ def _curve(
     splines: tuple[Spline, ...],
     score: Score,
 ) -> Curve:
-    roughness = splines[0].roughness
+    roughness = _roughness(splines)
     smoothed = smooth(score, roughness, moved.fit.observations)
     p, fall, number = chance(score, roughness)
     return Curve(
@@ -299,3 +323,7 @@ def _curve(
         places=tuple(moved.along(c)[moved.linked, 0] for c in coords),
         score=score,
     )
+
+
+def _roughness(splines: tuple[Spline, ...]) -> Array:
+    return splines[0].roughness if len(splines) == 1 else rough_product(*splines)

@@ -93,6 +93,8 @@ def formulas_for(
     those of a model's states. The most probable formula comes first; those that are less probable by
     `EVIDENCE_MARGIN` are dropped.
     """
+    if len(curve.coordinates) != 1:
+        return []
     target = _Target(curve, observations)
     regressed = regression(curve, _MOST_CONSTANTS, seed)
     trials = []
