@@ -54,6 +54,11 @@ def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
     return list(first.values())[:_TRIED]
 
 
+def _pair(candidates: Sequence[Candidate]) -> set[tuple[str, str | None]]:
+    """Return what identifies effects that are fitted together, whatever their order and their widths."""
+    return {(c.effect.name, c.effect.momentum) for c in candidates}
+
+
 class Proposals:
     """Trial fits around a fit of the training part, from the scores of its missing effects."""
 
@@ -100,19 +105,19 @@ class Proposals:
         return [c for c in likely if c.key_without_momentum in kinds]
 
     def only_together(self, trials: Sequence[TrialFit]) -> tuple[list[TrialFit], int]:
-        """Fit pairs of effects that may pass only together, without those of `trials`; count all pairs."""
+        """Fit pairs of effects that may pass only together, unless `trials` has them; count all pairs."""
         best, number = self.scores.library.pairs(_TOGETHER)
         loose = self._loose(trials)
-        tried = [{c.effect.name for c in t.candidates} for t in trials]
         likely = [
             [s.candidate for s in group]
             for group, fall in best
-            if len(names := {s.candidate.effect.name for s in group} - loose) == 2
-            and names not in tried
+            if len({s.candidate.effect.name for s in group} - loose) == 2
             and fall > self.scores.fit.film_error_chi2
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
-        return self._together(likely), number
+        fitted = [t for t in trials if len(t.candidates) == 2 and _pair(t.candidates) in map(_pair, likely)]
+        left = [group for group in likely if _pair(group) not in [_pair(t.candidates) for t in fitted]]
+        return fitted + self._together(left), number
 
     def curves(self, likely: list[Curve], most: float = math.inf) -> list[TrialFit]:
         """Locate curves as splines; abandon those with a chi2 above `most`."""
