@@ -551,8 +551,8 @@ def test_a_surface_is_added_and_refitted():
     assert located.fit.converged
     # chi2 is no criterion: the plain model needs a larger model error, with which any model fits.
     assert located.fit.evidence > base.evidence + 200
-    # Where the record has been the surface is the law, but for what a torque over Y or over Z alone could do
-    # as well (friction, a pivot that is off): the mixed second difference is left.
+    # A torque over Y or over Z alone may be friction, or a pivot that is off. The surface determines only the
+    # mixed second difference.
     y, z = np.meshgrid([-0.015, 0.015], [-0.02, 0.01], indexing="ij")
     mixed = np.diff(np.diff(located.curve.values(y, z), axis=0), axis=1).item()
     assert mixed == pytest.approx(6 * 0.03 * 0.03, rel=0.25)
