@@ -29,7 +29,7 @@ from .trial_fits import (
 _TRIED = 12  # best candidates that are fitted in full
 _ALIKE = 6  # further candidates that act almost like the best
 _TOGETHER = 6  # pairs of effects that may pass only together
-_COORDINATES = 4  # coordinates over which curves are located
+_COORDINATES = 5  # coordinates over which curves are located
 _HOPELESS = 2.0  # ratio to the best fit's chi2 above which a fit that does not converge is abandoned
 _PAIRED = 4  # best-scored effects of which all pairs are fitted in full
 

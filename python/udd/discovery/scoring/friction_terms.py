@@ -29,6 +29,7 @@ _TURNS = 0.03  # the same for the sign of dry friction under load
 # width at a place is a shape, and the prior of the place has the same width.
 _FREE = (0.5, 1.5)
 _SIZE, _PLACE, _WIDTH = Shape("scanned", _FREE), Shape("scanned", _FREE, EITHER), Shape("shape", _FREE)
+_EXPONENT = Shape("scanned", _FREE, (-0.95, np.inf))
 
 
 def places(visited: Array, width: float, *, angle: bool = False) -> list[float]:
@@ -98,7 +99,7 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
         small = f"{(_ROUND * joint.typical) ** 2:.3g}"
         power = f"{{c}}*({v}^2 + {small})^({{n}}/2)*{v}"
         title, tried = f"power of the speed in {slot}", [(value,) for value in POWERS]
-        result.append(laws(model, slot, power, title, {"c": NEGATIVE}, {"n": _SIZE}, tried))
+        result.append(laws(model, slot, power, title, {"c": NEGATIVE}, {"n": _EXPONENT}, tried))
         settling, times = f"{{c}}*exp(-t/{{tau}})*{v}", [(share * duration,) for share in DURATIONS]
         title = f"friction that settles with time in {slot}"
         result.append(laws(model, slot, settling, title, {"c": EITHER}, {"tau": _SIZE}, times))
