@@ -28,7 +28,7 @@ _SHORTEST = 0.2  # smallest share of a move; below it no move improves the fit
 _WORSE = 1.02  # factor in chi2 that a move may cost
 _SLOW = 0.01  # share of chi2; once it decreases by less the model error may be reduced
 _SOFT = 1e-3
-_STILL = 0.5  # nats that another move must bring; fits around it end within a few nats
+_STILL = 0.05  # nats that another move must bring
 
 
 @dataclass(frozen=True, repr=False)

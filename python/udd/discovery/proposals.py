@@ -54,11 +54,6 @@ def _machines_first(passing: Sequence[Scored]) -> list[Scored]:
     return list(first.values())[:_TRIED]
 
 
-def _pair(candidates: Sequence[Candidate]) -> set[tuple[str, str | None]]:
-    """Return what identifies effects that are fitted together, whatever their order and their widths."""
-    return {(c.effect.name, c.effect.momentum) for c in candidates}
-
-
 class Proposals:
     """Trial fits around a fit of the training part, from the scores of its missing effects."""
 
@@ -105,7 +100,7 @@ class Proposals:
         return [c for c in likely if c.key_without_momentum in kinds]
 
     def only_together(self, trials: Sequence[TrialFit]) -> tuple[list[TrialFit], int]:
-        """Fit pairs of effects that may pass only together, unless `trials` has them; count all pairs."""
+        """Fit pairs of effects that may pass only together, also those of `trials`, anew; count all."""
         best, number = self.scores.library.pairs(_TOGETHER)
         loose = self._loose(trials)
         likely = [
@@ -115,9 +110,7 @@ class Proposals:
             and fall > self.scores.fit.film_error_chi2
             and chi_squared.sf(fall, sum(len(s.amplitudes) for s in group)) * number < ALPHA
         ]
-        fitted = [t for t in trials if len(t.candidates) == 2 and _pair(t.candidates) in map(_pair, likely)]
-        left = [group for group in likely if _pair(group) not in [_pair(t.candidates) for t in fitted]]
-        return fitted + self._together(left), number
+        return self._together(likely), number
 
     def curves(self, likely: list[Curve], most: float = math.inf) -> list[TrialFit]:
         """Locate curves as splines; abandon those with a chi2 above `most`."""
