@@ -100,7 +100,7 @@ class Proposals:
         return [c for c in likely if c.key_without_momentum in kinds]
 
     def only_together(self, trials: Sequence[TrialFit]) -> tuple[list[TrialFit], int]:
-        """Fit pairs of effects that may pass only together, also those of `trials`, anew; count all."""
+        """Fit pairs of effects that may pass only together, also those of `trials`; count all pairs."""
         best, number = self.scores.library.pairs(_TOGETHER)
         loose = self._loose(trials)
         likely = [
