@@ -213,8 +213,8 @@ class Search:
         together, number = proposals.only_together(trials)
         if pair := self.tests.best(current, together, replace(scores, comparisons=number)):
             return pair
-        # For a disk no surface was ever accepted, and its fits take five minutes. Without them the error of a
-        # cup on a rod is 2.4 times larger.
+        # For a disk no surface was ever accepted, and its fits take five minutes. Without surfaces the error
+        # of a real cup on a string is twice as large.
         if not chaotic:
             self.tell("scoring surfaces over two coordinates")
             rounds[-1] = scores = with_surfaces(scores)

@@ -51,7 +51,7 @@ class SearchData:
 
     @property
     def held_out_numbers(self) -> tuple[int, ...]:
-        """Numbers of the measurements that are held out whole."""
+        """Numbers of the whole held-out measurements."""
         return tuple(sorted(self.order[len(self.order) - self.held_out :]))
 
     @property

@@ -267,7 +267,7 @@ def _pace(p: Parameters) -> float:
     return float(p["length"] / p["inertia"])
 
 
-# --- what to film next
+# --- what a curve can be a function of
 
 #: F/g - 1, where F is the rod's force on the pivot: the bob's weight and its centrifugal force.
 _LOAD = "(cos(theta) + length*Omega^2/g - 1)"
@@ -287,6 +287,8 @@ def _coordinates(model: Pendulum) -> tuple[Coordinate, ...]:
     load = Coordinate("load", partial(_load, model), partial(_loading, model), False, _LOAD)
     return (load,) if model.g else ()
 
+
+# --- what to film next
 
 _SWINGS = (0.5, 1.5, 2.0)  # times the present start
 _UPRIGHT = 2.8  # rad; a pendulum is not started farther out

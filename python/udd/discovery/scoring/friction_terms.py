@@ -29,7 +29,7 @@ _TURNS = 0.03  # the same for the sign of dry friction under load
 # width at a place is a shape, and the prior of the place has the same width.
 _FREE = (0.5, 1.5)
 _SIZE, _PLACE, _WIDTH = Shape("scanned", _FREE), Shape("scanned", _FREE, EITHER), Shape("shape", _FREE)
-_EXPONENT = Shape("scanned", _FREE, (-0.95, np.inf))
+_EXPONENT = Shape("scanned", _FREE, (-0.95, np.inf))  # as of `power_drag`; -1 would be dry friction
 
 
 def places(visited: Array, width: float, *, angle: bool = False) -> list[float]:
