@@ -131,6 +131,11 @@ impl Op {
         }
     }
 
+    /// Returns true if its first operand must not be negative.
+    fn needs_positive(self) -> bool {
+        matches!(self, Op::Binary(Binary::Power) | Op::Unary(Unary::Sqrt | Unary::Ln))
+    }
+
     /// Its name in a formula's text; for a value that is pushed, the kind of the value.
     pub fn name(self) -> &'static str {
         match self {
@@ -211,6 +216,30 @@ impl Expression {
                 self.ops.splice(at..at + old.len(), [new]);
             }
             at += 1;
+        }
+    }
+
+    /// Inserts `more` after each of these operations in an argument that must not be negative, as that of a root.
+    pub(crate) fn extend_in_roots(&mut self, old: Op, more: &[Op]) {
+        // The start of each number on the stack.
+        let mut starts: Vec<usize> = Vec::new();
+        let mut i = 0;
+        while i < self.ops.len() {
+            let op = self.ops[i];
+            let at = starts.len() - op.takes();
+            let start = starts.get(at).copied().unwrap_or(i);
+            if op.needs_positive() {
+                let end = starts.get(at + 1).copied().unwrap_or(i);
+                for k in (start..end).rev() {
+                    if self.ops[k] == old && !self.ops[k + 1..].starts_with(more) {
+                        self.ops.splice(k + 1..k + 1, more.iter().copied());
+                        i += more.len();
+                    }
+                }
+            }
+            starts.truncate(at);
+            starts.push(start);
+            i += 1;
         }
     }
 
@@ -297,7 +326,7 @@ impl Unary {
                 let below = S::jumping(a.less(S::zero()), -S::one(), S::zero());
                 S::jumping(S::zero().less(a), S::one(), below)
             }
-            Unary::Sqrt => a.sqrt(),
+            Unary::Sqrt => root(a),
             Unary::Exp => a.exp(),
             Unary::Ln => a.ln(),
             Unary::Sin => a.sin(),
@@ -343,12 +372,25 @@ fn power_of<S: Scalar>(a: S, b: S) -> S {
     }
     for lane in 0..S::Real::LANES {
         let exponent = b.real().lane(lane);
-        let whole = exponent as i32;
-        if a.real().lane(lane) <= 0.0 && f64::from(whole) == exponent {
-            result = S::select(S::Mask::from_lanes(|own| own == lane), power(a, whole), result);
+        let (base, whole) = (a.real().lane(lane), exponent as i32);
+        let lane = S::Mask::from_lanes(|own| own == lane);
+        if base <= 0.0 && f64::from(whole) == exponent {
+            result = S::select(lane, power(a, whole), result);
+        } else if base == 0.0 && exponent > 0.0 {
+            result = S::select(lane, S::zero(), result); // as for a root
         }
     }
     result
+}
+
+/// The square root, without a slope at zero: times zero an infinite one would be no number, as in `v sqrt(|v|)`.
+#[inline(always)]
+fn root<S: Scalar>(a: S) -> S {
+    if S::ORDER == 0 || S::SYMBOLIC {
+        return a.sqrt();
+    }
+    let smallest = S::constant(f64::from_bits(1));
+    S::select(a.less(smallest).and(a.less(S::zero()).not()), S::zero(), a.sqrt())
 }
 
 #[inline(never)]

@@ -455,7 +455,7 @@ impl Graph {
                     of[1] = if k == 0 { at } else { of[1] };
                 }
             }
-            if matches!(op, Op::Binary(Binary::Power) | Op::Unary(Unary::Sqrt | Unary::Ln)) {
+            if op.needs_positive() {
                 of[0] = self.defined(of[0]);
             }
             stack.push(self.value(op, of));

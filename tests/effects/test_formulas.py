@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import udd
 from udd import effects
@@ -229,3 +230,45 @@ def test_a_key_that_an_effect_does_not_have_is_told_with_those_it_has(kind: str)
     with pytest.raises(udd.UddError) as error:
         serialization.from_dict({kind: {"x" * 5000: 1}})
     assert len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize(
+    "text", ["-b*Omega*sqrt(abs(Omega))", "-b*Omega*abs(Omega)^n", "-b*sqrt(4*speed)*Omega/2"]
+)
+@pytest.mark.parametrize("method", ["dopri5", "dop853", "auto"])
+def test_a_root_of_the_speed_is_crossed(text: str, method: str) -> None:
+    # Beyond its kink the speed of a step's side is negative, and the step used to shrink to nothing.
+    given = {"b": 0.01} | ({"n": 0.5} if "^n" in text else {})
+    drag = formula("torque", text, amplitudes=["b"], **given)
+    pendulum, t = udd.Pendulum(0.5, k0=0.01, effects=[drag]), np.arange(0.0, 20.0, 0.02)
+
+    def rates(_t: float, s: np.ndarray) -> list[float]:
+        return [(-9.81 * 0.5 * np.sin(s[1]) - 0.01 * (1 + abs(s[0]) ** 0.5) * s[0]) / 0.25, s[0]]
+
+    exact = solve_ivp(rates, (0.0, 20.0), [0.0, 1.0], "DOP853", t, rtol=1e-11, atol=1e-13)
+    run = udd.simulate(pendulum, t, [0.0, 1.0], method=method)
+    np.testing.assert_allclose(run.state, exact.y.T, atol=1e-6)
+
+
+@pytest.mark.parametrize("text", ["-b*v*sqrt(abs(v))", "-b*v*abs(v)^n"])
+def test_a_law_with_a_root_of_the_speed_is_fitted(text: str) -> None:
+    # A step ends on the root's zero, where its slope is infinite: times zero that was no number.
+    t, noise = np.arange(0.0, 40.0, 0.04), 2e-3 * np.random.default_rng(1).standard_normal(1000)
+
+    def own(b: float) -> udd.Model:
+        return udd.Model(
+            ["x", "v"], ["v", f"-x - 0.02*v {text}"], {"b": b} | ({"n": 0.5} if "^n" in text else {})
+        )
+
+    x = udd.simulate(own(0.02), t, [1.0, 0.0]).state[:, 0]
+    result = udd.fit(udd.Measurement(t, {"x": x + noise}), own(0.03), free=["b"])
+    assert abs(result.parameters["b"] - 0.02) < 4 * result.errors["b"]
+    drag = formula(
+        "torque", text.replace("v", "Omega"), amplitudes=["b"], b=0.01, **({"n": 0.5} if "^n" in text else {})
+    )
+    pendulum = udd.Pendulum(0.5, k0=0.01, effects=[drag])
+    theta = udd.simulate(pendulum, t, [0.0, 1.0]).state[:, 1]
+    measured = udd.Measurement(t, {"theta": theta + noise})
+    start = pendulum.with_parameters({"formula.b": 0.02})
+    result = udd.fit(measured, start, free=["formula.b"], camera=False)
+    assert abs(result.parameters["formula.b"] - 0.01) < 4 * result.errors["formula.b"]
