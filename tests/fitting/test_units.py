@@ -230,3 +230,15 @@ def test_what_remains_doubtful_after_a_search_is_a_remark(tmp_path):
         ),
     ).remarks
     assert remark.startswith("Fixed at their given values, because they diverge if they are free: W, clock.")
+
+
+@pytest.mark.parametrize("text", ["a*tan(3*theta)", "a*exp(Omega^4)"])
+def test_a_law_that_cannot_be_integrated_blames_no_unit(text):
+    # Any other unit made the angle or the speed so small that the law could be integrated.
+    t = np.arange(0, 40, 0.04)
+    theta = udd.simulate(udd.Pendulum(0.5, k0=0.01), t, [0.0, 1.0]).state[:, 1]
+    record = udd.Measurement(t, {"theta": theta + 5e-3 * np.random.default_rng(1).standard_normal(len(t))})
+    law = udd.effects.formula("torque", text, a=0.1)
+    with pytest.raises(udd.FitError, match="could not be integrated") as refused:
+        udd.fit(record, udd.Pendulum(0.5, k0=0.01, effects=[law]), free=["formula.a"])
+    assert "degrees" not in str(refused.value) and "stated" not in str(refused.value)
