@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import udd
 from udd.discovery.proposals import Proposals
@@ -203,3 +204,23 @@ def test_only_a_motion_that_turns_back_shows_friction_in_one_direction(offset, l
     states = np.column_stack([speed, np.zeros((len(speed), 3))])
     names = {one.effect.name for one in library(udd.Disk(0.04), states=states)}
     assert ({"one_way", "one_way_drag"} <= names) is listed
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_length_that_drifts_is_no_torque_over_the_angle(seed):
+    # A swing decays while the length grows by 2 % a minute; "torque = a tanh(b theta)" was called identified.
+    t, rng = np.arange(0, 70, 0.04), np.random.default_rng(seed)
+
+    def rates(now, state):
+        length, growth = 0.5 * (1 + 0.02 * now / 60), 0.5 * 0.02 / 60
+        torque = -9.81 * length * np.sin(state[1]) - (0.01 + 2 * length * growth) * state[0]
+        return [torque / length**2, state[0]]
+
+    theta = solve_ivp(rates, (0.0, 70.0), [0.0, 1.0 + 0.2 * seed], "DOP853", t, rtol=1e-9, atol=1e-11).y[1]
+    record = udd.Measurement(t, {"theta": theta + 5e-3 * rng.standard_normal(len(t))})
+    discovery = udd.discover(record, udd.Pendulum(0.5, k0=0.012), progress=False)
+    assert discovery.verdict == "effect present, form not identified"
+    pull = next(one for one in discovery.effects if one.effect.name == "drifting_pull")
+    # g L/L^2 falls by g/L times the growth: in the unit of the fit, an inertia of 0.25 m^2 at 0.5 m.
+    assert pull.parameters["a"] == pytest.approx(-9.81 * 0.5 * 0.02 / 60, rel=0.1)
+    assert "effects of time and of amplitude are confounded" in discovery.doubts[0]

@@ -110,6 +110,11 @@ def test_hypotheses_come_in_order_of_their_log_evidence():
     assert [h.log_z for h in ranked(table)] == [8.0, 8.2, 3.0, -1.0]  # ties as they came in
 
 
+def test_a_law_comes_before_a_formula_that_is_as_probable():
+    curve, law = hypothesis(3.3, QUADRATIC, formula="2.0*x*tanh(3.0*x)", curve=1), hypothesis(3.0, CUBIC)
+    assert ranked([curve, law]) == [law, curve]
+
+
 def test_rivals_are_what_lies_within_ten_nats():
     chosen = hypothesis(100.0, QUADRATIC)
     close, far = hypothesis(91.0, CUBIC), hypothesis(89.0, COULOMB)
@@ -127,6 +132,13 @@ def test_a_wider_law_is_a_rival_only_if_it_gains():
 def test_the_chosen_law_in_other_words_is_no_rival():
     again = udd.effects.formula("friction", "a*abs(Omega)", amplitudes=["a"], a=0.01)
     assert rivals(hypothesis(100.0, QUADRATIC), [hypothesis(99.0, again, formula="1*x")], KNOWN) == []
+
+
+def test_a_rival_in_another_notation_is_listed_once():
+    written = udd.effects.formula("friction", "a*abs(Omega)^2", amplitudes=["a"], a=0.01)
+    again = udd.effects.formula("friction", "a*Omega^2", amplitudes=["a"], a=0.01)
+    table = [hypothesis(99.0, written, formula="1*abs(x)^2"), hypothesis(98.0, again, formula="1*x^2")]
+    assert rivals(hypothesis(100.0, QUADRATIC), table, KNOWN) == table[:1]
 
 
 def test_the_law_of_the_library_comes_before_the_same_in_other_words():
@@ -169,6 +181,9 @@ def test_priors_count_terms_symbols_and_splines():
         ("2.0*x + 1.0*x^3", False, 6),
         ("1.0 + 2.0*tanh(3.0*x)", False, 5),
         ("2.0*sin(0.3*x)*abs(tanh(1.5*x) - 0.27*x)", False, 12),
+        ("2.0*x*abs(x)", True, 5),
+        ("2.0*x*abs(x)^1.5", True, 6),
+        ("2.0*x*tanh(3.0*x)", False, 6),
     ],
 )
 def test_a_single_term_has_its_coordinate_on_one_side(text, single, symbols):
@@ -322,6 +337,8 @@ def test_friction_over_the_time_alone_leaves_the_form_open(monkeypatch):
     monkeypatch.setattr("udd.discovery.verdict.readings", lambda _fit: [])
     settles = udd.effects.warming_friction(a=0.01, tau=30.0)
     numbers = final(warming_friction__a=(0.01, 0.001))
+    assert doubts_of([added(settles)], numbers, (0.5, 0.4, 0.6), 1000) == []  # a driven disk does not settle
+    numbers.model = udd.Pendulum(0.5)
     (doubt,) = doubts_of([added(settles)], numbers, (0.5, 0.4, 0.6), 1000)
     assert "effects of time and of amplitude are confounded" in doubt
 

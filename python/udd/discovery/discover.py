@@ -11,7 +11,6 @@ from udd._util.expressions import Expression
 from udd._util.progress import Progress, with_status
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.scoring.term_library import given_terms
-from udd.discovery.symbolic.expressions import is_single_term
 from udd.discovery.validation.by_record import by_record
 from udd.discovery.validation.held_camera import camera_shows
 from udd.discovery.validation.held_out_errors import lacks_more, misses_the_motion
@@ -264,7 +263,7 @@ def _title(candidate: Candidate, fitted: Effect) -> str:
 
 def _describe(step: Step, final: Fit) -> list[AddedEffect]:
     """Describe the effects of a step, with the numbers of the fit to all data."""
-    result, tests, formula = [], step.result, step.chosen.trial.formula
+    result, tests = [], step.result
     assert tests.witness is not None
     for candidate in step.candidates:
         effect = next(e for e in final.model.effects if e.name == candidate.effect.name)
@@ -282,7 +281,7 @@ def _describe(step: Step, final: Fit) -> list[AddedEffect]:
                 ratio=tests.ratio,
                 witness=tests.witness,
                 curve=step.curve,
-                is_law=step.curve is None or (formula is not None and is_single_term(formula.node)),
+                is_law=step.chosen.is_law,
                 tried=candidate.title,
             )
         )

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from udd.discovery.scoring.candidate import brakes_with_time, like_geometry
+from udd.discovery.scoring.candidate import changes_with_time, like_geometry
 from udd.discovery.scoring.look_alikes import by_parameter
-from udd.discovery.symbolic.expressions import length
+from udd.discovery.symbolic.expressions import is_single_term, length
 from udd.effects import Effect
 from udd.errors import ModelError
 from udd.fitting import Fit
@@ -85,6 +85,12 @@ class Hypothesis:
         return log_evidence(self.whole, self.again.names) - freedom + self.prior - cost * unsure
 
     @property
+    def is_law(self) -> bool:
+        """True for terms of the library, and for a formula that is one term."""
+        formula = self.trial.formula
+        return self.trial.curve is None or (formula is not None and is_single_term(formula.node))
+
+    @property
     def constants(self) -> int:
         """Count of estimated numbers."""
         return max(len(self.trial.names), sum(c.parameters for c in self.trial.candidates))
@@ -95,11 +101,11 @@ def log_prior(trial: TrialFit, terms: int) -> float:
 
     A term of the library is one of these. A formula costs its description length in nats, and its coordinate.
     A spline says less than a law and must be far better to lead. A coordinate such as the time, which can
-    imitate others, costs more. A term that machines hardly have, and friction that changes with time alone,
-    must be five nats better.
+    imitate others, costs more. A term that machines hardly have, and friction or a torque that changes with
+    time, must be five nats better.
     """
     single = -math.log(terms)
-    unusual = EVIDENCE_MARGIN / 2 * sum(not c.usual or brakes_with_time(c.effect) for c in trial.candidates)
+    unusual = EVIDENCE_MARGIN / 2 * sum(not c.usual or changes_with_time(c.effect) for c in trial.candidates)
     if trial.curve is not None:
         unusual -= trial.curve.log_prior
     if trial.formula is not None:
@@ -178,11 +184,11 @@ def _limits(effects: Sequence[Effect], constants: Iterable[str]) -> Iterator[dic
 def ranked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Sort hypotheses by their log evidence, the best first.
 
-    Those that are behind by the same number of nats tie and keep their order, as a slip and a relaxation do,
-    which are identical at one drive.
+    Those that are behind by the same number of nats tie: laws come before other formulas. Otherwise they keep
+    their order, as a slip and a relaxation do, which are identical at one drive.
     """
     most = max((h.log_z for h in hypotheses), default=0.0)
-    return sorted(hypotheses, key=lambda h: round(most - h.log_z))
+    return sorted(hypotheses, key=lambda h: (round(most - h.log_z), not h.is_law))
 
 
 def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[Hypothesis]:
@@ -203,9 +209,9 @@ def rivals(
     """Return the hypotheses that the data cannot distinguish from the chosen one.
 
     They are within ten nats of it. These are no rivals: splines, if a law was chosen; formulas that the
-    chosen law contains; laws that contain it with more constants and no gain.
+    chosen law or a better rival contains; laws that contain it with more constants and no gain.
     """
-    result = []
+    result: list[Hypothesis] = []
     for other in others:
         if other is chosen or other.log_z < chosen.log_z - EVIDENCE_MARGIN:
             continue
@@ -216,7 +222,11 @@ def rivals(
         wider = other.constants > chosen.constants
         if wider and other.log_z <= chosen.log_z and contains(other, chosen, known_parameters):
             continue
-        if not wider and other.trial.formula is not None and contains(chosen, other, known_parameters):
-            continue  # the chosen law in another form
+        if other.trial.formula is not None and any(
+            contains(law, other, known_parameters)
+            for law in (chosen, *result)
+            if law.constants >= other.constants and not law.trial.is_curve
+        ):
+            continue  # the same law in another notation
         result.append(other)
     return result

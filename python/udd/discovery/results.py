@@ -368,7 +368,13 @@ class Discovery(Drawable):
     def remarks(self) -> list[str]:
         """Caveats about the final fit, one sentence each."""
         said = [sentence(title, answers) for title, answers in self.by_record] + self.doubts
-        said += [f"A parameter is far from its given value: {runaway.text}." for runaway in ran_off(self.fit)]
+        runaways = ran_off(self.fit)
+        said += [f"A parameter is far from its given value: {runaway.text}." for runaway in runaways]
+        if any(runaway.name.partition("[")[0] not in self.fit.model.parameters for runaway in runaways):
+            said.append(
+                "A missing law of the angle or the place may look like such a camera: measure where the "
+                "camera and the pivot were."
+            )
         if doubt := self.fit.unit_doubt:
             said.append(f"{doubt[0].upper()}{doubt[1:]}. The fit uses the given units.")
         if self.effects and lacks_more(self.fit, self.error_after):

@@ -75,9 +75,11 @@ def like_geometry(effect: effects.Effect) -> bool:
     return bool(re.search(r"\b(theta|beta)\b", effect.equation)) or effect.name in ONE_WAY
 
 
-def brakes_with_time(effect: effects.Effect) -> bool:
-    """Return True if an effect is friction as a function of the time alone.
+def changes_with_time(effect: effects.Effect) -> bool:
+    """Return True if an effect is friction or a torque that changes with time, but for a wave.
 
     As a swing decays, the effects of time and of amplitude are confounded.
     """
-    return effect.slots[0] == "friction" and bool(re.search(r"\b[tT]\b", effect.equation))
+    is_wave = any(p.role == "frequency" for p in effect.spec.parameters)
+    in_time = effect.slots[0] in ("friction", "torque") and bool(re.search(r"\b[tT]\b", effect.equation))
+    return in_time and not is_wave

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
+from udd.effects.user_defined import written
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
@@ -38,9 +39,10 @@ def library(
     """List every effect that can be added to a model, in each of its variants, except scanned ones.
 
     For a user's own model they are made of its states (:mod:`udd.discovery.scoring.term_library`). Dry
-    friction is included if a motion, (n, d), is given: it determines the width of its smoothed sign. So is
-    friction that depends on the direction, for other models. `given` candidates come first. Terms that the
-    free parameters absorb are not removed here, because that depends on the data.
+    friction is included if a motion, (n, d), is given: it determines the width of its smoothed sign. For
+    other models friction that depends on the direction is included, and a pull that drifts. `given`
+    candidates come first. Terms that the free parameters absorb are not removed here, because that depends
+    on the data.
     """
     there = {effect.name for effect in model.effects}
     if isinstance(model, FormulaModel):
@@ -67,7 +69,18 @@ def library(
     if states is None:
         return result
     speed = states[:, model.state_names.index("Omega")]
-    return result + [candidate for candidate in one_way(speed) if candidate.effect.name not in there]
+    further = [*one_way(speed), *drifting_pull(model)]
+    return result + [candidate for candidate in further if candidate.effect.name not in there]
+
+
+def drifting_pull(model: Model) -> list[Candidate]:
+    """List a pendulum's pull that changes with time, as a string that stretches changes it."""
+    # Without this a drift of the length is called a torque over the angle: a swing decays in that time.
+    if "theta" not in model.state_names:
+        return []
+    title = "gravity's pull that changes with time"
+    spec = written("torque", "-a*t*sin(theta)", "drifting_pull", title, ["a"], None, ("a",))
+    return [Candidate(effects.Effect(spec.name, (0.0,), made=spec), title, usual=False)]
 
 
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:

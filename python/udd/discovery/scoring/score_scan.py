@@ -15,7 +15,7 @@ from udd._util import chi_squared
 from udd._util.one_line import OneLine
 from udd.fitting import Fit
 from udd.fitting.time_scale import motion_time_scale
-from udd.models.formula_model import FormulaModel
+from udd.models import Model
 
 from .candidate import Candidate
 from .candidates import ripples
@@ -155,10 +155,10 @@ def strongest_ripple(fit: Fit) -> tuple[Scored | None, int]:
 
     The frequencies are half a line (1 / duration) apart. First every second one is scored. A ripple between
     two lines still has two fifths of its strength in both, so the frequencies between are only scored next to
-    the strongest lines. For a user's own model the result is the strongest harmonic force in any equation; a
-    pendulum has none.
+    the strongest lines. For a model without a drive the result is the strongest harmonic force in any
+    equation.
     """
-    if isinstance(fit.model, FormulaModel):
+    if fit.model.profile.dynamics.drive is None:
         scored = _scan_waves(fit, fit.model)
         return max(scored, key=lambda s: s.chi2, default=None), len(scored)
     candidates = ripples(fit.model, fit.record.t)
@@ -179,7 +179,7 @@ def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
     return [score_of(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
 
 
-def _scan_waves(fit: Fit, model: FormulaModel) -> list[Scored]:
+def _scan_waves(fit: Fit, model: Model) -> list[Scored]:
     moved, t = responses(fit), fit.record.t
     # As for the disk's drive ripple: forces much faster than the motion have no effect.
     fastest = min(0.25 / float(np.median(np.diff(t)[fit.record.linked])), 6.0 / motion_time_scale(fit))

@@ -15,6 +15,7 @@ from udd import effects
 from udd._util.expressions import Expression, text_of
 from udd.effects.user_defined import along_of
 from udd.errors import ModelError
+from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .candidate import Candidate
@@ -284,18 +285,24 @@ def _candidate(model: FormulaModel, slot: str, text: str, name: str, said: str) 
     return Candidate(effect, title)
 
 
-def waves(model: FormulaModel, frequencies: Iterable[float]) -> list[Candidate]:
-    """List a wave of each frequency in each equation that is not just the rate of another state."""
+def waves(model: Model, frequencies: Iterable[float]) -> list[Candidate]:
+    """List a wave of each frequency in each equation that is not just the rate of another state.
+
+    A pendulum has waves in its torque.
+    """
     text = "{a}*cos(2*pi*{f}*t) + {b}*sin(2*pi*{f}*t)"
     # The fit may move it within its line.
     amplitudes, shapes = {"a": EITHER, "b": EITHER}, {"f": Shape("frequency", (), EITHER)}
     tried = [(float(f),) for f in frequencies]
     result = []
     for slot in slots(model):
+        if slot.name == "friction":
+            continue
         name, title = f"wave_in_{_place(slot.name)}", f"a wave in {slot.name}"
         for wave in laws(model, slot.name, text, title, amplitudes, shapes, tried, name):
             frequency = wave.effect.values[-1]
-            result.append(replace(wave, title=f"a wave of frequency {frequency:.4g} in {slot.name}"))
+            title = f"a wave of frequency {frequency:.4g} in {slot.name}"
+            result.append(replace(wave, title=title, usual=False))
     return result
 
 

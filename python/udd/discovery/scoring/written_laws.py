@@ -1,4 +1,4 @@
-"""Laws for a user's own model, written as formulas."""
+"""Laws written as formulas."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from udd import effects
 from udd.effects.user_defined import written
-from udd.models.formula_model import FormulaModel
+from udd.models import Model
 
 from .candidate import Candidate
 
@@ -31,7 +31,7 @@ class Shape:
 
 
 def laws(
-    model: FormulaModel,
+    model: Model,
     slot: str,
     text: str,
     title: str,
@@ -61,9 +61,9 @@ def laws(
     return [Candidate(effects.Effect(spec.name, (*zero, *values), made=spec), title) for values in tried]
 
 
-def unused_names(model: FormulaModel, *wanted: str) -> list[str]:
+def unused_names(model: Model, *wanted: str) -> list[str]:
     """Return names for a term's parameters that are unused in the model."""
-    taken = {*model.state_names, *dict(model.values), *model.inputs, "t", "pi"}
+    taken = {*model.state_names, *model.parameters, *model.inputs, "t", "pi"}
     return [
         next(n for n in (name, *(f"{name}{k}" for k in range(1, 99))) if n not in taken) for name in wanted
     ]

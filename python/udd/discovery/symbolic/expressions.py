@@ -264,12 +264,20 @@ def is_single_term(node: Node) -> bool:
     """Return True if a formula is one term: a factor times one function of its coordinate, or one wave.
 
     No operation joins two parts that both depend on the coordinate, except the sine and the cosine of one
-    angle, and no constant is added to the term.
+    angle, and products that are a power, as ``x*abs(x)``. No constant is added to the term.
     """
     if node[0] in ("+", "-"):
         waves = {_wave(part) for part in node[1:]}
         return any(waves == {("sin", angle), ("cos", angle)} for angle in _angles(node))
-    return not any(len(part) == 3 and all(_varies(p) for p in part[1:]) for part in parts(node))
+    joined = (part for part in parts(node) if len(part) == 3 and all(_varies(p) for p in part[1:]))
+    return all(_is_power(part) for part in joined)
+
+
+def _is_power(node: Node) -> bool:
+    """Return True for a product of powers of the coordinate, of its absolute value, and of constants."""
+    if node[0] == "^":
+        return _is_power(node[1]) and not _varies(node[2])
+    return node[0] in ("x", "n", "c") or (node[0] in ("abs", "*", "/") and all(map(_is_power, node[1:])))
 
 
 def _varies(node: Node) -> bool:
