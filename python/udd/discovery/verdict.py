@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from udd.discovery.scoring.candidate import changes_with_time
+from udd.discovery.scoring.candidate import changes_with_time, is_driven
 from udd.discovery.validation.by_record import contested
 from udd.discovery.validation.held_out_errors import Ratio
 from udd.fitting import Fit
@@ -52,7 +52,7 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
             result.append(f"{effect.title} may be the drift of a sensor's zero.")
         # Without this, friction with a power of 1.2 in a pendulum is identified as friction that settles with
         # time. A driven disk does not settle.
-        if changes_with_time(effect.effect) and not _is_driven(final):
+        if changes_with_time(effect.effect) and not is_driven(final.model):
             result.append(
                 f"{effect.title}: as a swing decays, the effects of time and of amplitude are confounded."
             )
@@ -69,12 +69,6 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
     if added and not has_size(ratio) and not any(_predicts(effect.ratio, held_out) for effect in added):
         result.append("Held-out data gain less than 2 %, and less than 10 nats.")
     return result
-
-
-def _is_driven(final: Fit) -> bool:
-    """Return True if a drive keeps the motion going."""
-    drive = final.model.profile.dynamics.drive
-    return drive is not None and final.model.parameters[drive] != 0.0
 
 
 def _periods(added: AddedEffect, final: Fit) -> float:

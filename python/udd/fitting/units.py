@@ -259,9 +259,9 @@ def checked_units(
     free, unknown = options["free"], models[0].profile.fit.unknown
 
     def doubt(ends: Sequence[Sequence[Model]] = ()) -> str | None:
-        # Without effects: one that cannot be integrated in the given unit would favour all others.
         if not unknown:
             return None
+        # Without effects: one that cannot be integrated in the given unit would favour all others.
         plain = [[model.with_effects(()) for model in some] for some in (models, *ends)]
         unknown_free = [name for name in unknown if free is None or name in free]
         text = other_unit(measurements, plain[0], plain[1:], unknown_free)

@@ -20,7 +20,7 @@ class Candidate:
     title : str
         Name for a reader.
     usual : bool
-        True for terms that machines have; any other product of states has a prior penalty.
+        True for terms that machines have. Others, such as a wave, have a prior penalty.
     form : str
         Kind of friction that every joint may have; else empty.
     """
@@ -73,6 +73,12 @@ def like_geometry(effect: effects.Effect) -> bool:
     """
     # Without the second a real pendulum on a string has such friction.
     return bool(re.search(r"\b(theta|beta)\b", effect.equation)) or effect.name in ONE_WAY
+
+
+def is_driven(model: Model) -> bool:
+    """Return True if a drive keeps the motion going."""
+    drive = model.profile.dynamics.drive
+    return drive is not None and model.parameters[drive] != 0.0
 
 
 def changes_with_time(effect: effects.Effect) -> bool:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from udd import effects
-from udd.effects.user_defined import written
 from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
-from .candidate import Candidate
+from .candidate import Candidate, is_driven
 from .friction_terms import load_frictions, one_way
 from .term_library import delays, dry, terms, thresholds
+from .written_laws import EITHER, laws
 
 
 def renamed(effect: effects.Effect, model: Model) -> effects.Effect | None:
@@ -69,7 +69,7 @@ def library(
     if states is None:
         return result
     speed = states[:, model.state_names.index("Omega")]
-    further = [*one_way(speed), *drifting_pull(model)]
+    further = [*one_way(model, speed), *drifting_pull(model)]
     return result + [candidate for candidate in further if candidate.effect.name not in there]
 
 
@@ -79,8 +79,8 @@ def drifting_pull(model: Model) -> list[Candidate]:
     if "theta" not in model.state_names:
         return []
     title = "gravity's pull that changes with time"
-    spec = written("torque", "-a*t*sin(theta)", "drifting_pull", title, ["a"], None, ("a",))
-    return [Candidate(effects.Effect(spec.name, (0.0,), made=spec), title, usual=False)]
+    listed = laws(model, "torque", "-{a}*t*sin(theta)", title, {"a": EITHER}, name="drifting_pull")
+    return [replace(candidate, usual=False) for candidate in listed]
 
 
 def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
@@ -89,8 +89,8 @@ def ripples(model: Model, t: NDArray[np.float64]) -> list[Candidate]:
     The frequencies go from two periods in the record to a quarter of the frame rate (6 Hz at most), half a
     line apart, within the effect's own range. `t` are the times of the record's frames.
     """
-    spec, drive = effects.drive_ripple().spec, model.profile.dynamics.drive
-    if model.kind not in spec.bodies or drive is None or model.parameters[drive] == 0:
+    spec = effects.drive_ripple().spec
+    if model.kind not in spec.bodies or not is_driven(model):
         return []
     if spec.name in {e.name for e in model.effects}:
         return []

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from udd import effects
 from udd.effects.user_defined import FormulaSpec, written
+from udd.models import Model
 from udd.models.formula_model import FormulaModel
 
 from .candidate import ONE_WAY, Candidate
@@ -120,7 +120,7 @@ def frictions(model: FormulaModel, states: Array, duration: float) -> list[list[
     return [listed for listed in result if listed]
 
 
-def one_way(speed: Array) -> list[Candidate]:
+def one_way(model: Model, speed: Array) -> list[Candidate]:
     """List frictions of a disk or a pendulum that differ by the direction of motion: even in the speed.
 
     A motion (n,) that hardly turns back does not distinguish them from other friction.
@@ -129,11 +129,14 @@ def one_way(speed: Array) -> list[Candidate]:
         return []
     linear, quadratic = ONE_WAY
     listed = (
-        (linear, "friction that depends on the direction", "-a*abs(Omega)"),
-        (quadratic, "quadratic drag that depends on the direction", "-a*Omega^2"),
+        (linear, "friction that depends on the direction", "-{a}*abs(Omega)"),
+        (quadratic, "quadratic drag that depends on the direction", "-{a}*Omega^2"),
     )
-    specs = [written("torque", text, name, title, ["a"], None, ("a",)) for name, title, text in listed]
-    return [Candidate(effects.Effect(spec.name, (0.0,), made=spec), spec.title) for spec in specs]
+    return [
+        candidate
+        for name, title, text in listed
+        for candidate in laws(model, "torque", text, title, {"a": EITHER}, name=name)
+    ]
 
 
 def further() -> tuple[FormulaSpec, ...]:

@@ -295,14 +295,11 @@ def waves(model: Model, frequencies: Iterable[float]) -> list[Candidate]:
     amplitudes, shapes = {"a": EITHER, "b": EITHER}, {"f": Shape("frequency", (), EITHER)}
     tried = [(float(f),) for f in frequencies]
     result = []
-    for slot in slots(model):
-        if slot.name == "friction":
-            continue
+    for slot in (slot for slot in slots(model) if slot.name != "friction"):
         name, title = f"wave_in_{_place(slot.name)}", f"a wave in {slot.name}"
         for wave in laws(model, slot.name, text, title, amplitudes, shapes, tried, name):
-            frequency = wave.effect.values[-1]
-            title = f"a wave of frequency {frequency:.4g} in {slot.name}"
-            result.append(replace(wave, title=title, usual=False))
+            with_frequency = f"a wave of frequency {wave.effect.values[-1]:.4g} in {slot.name}"
+            result.append(replace(wave, title=with_frequency, usual=False))
     return result
 
 
