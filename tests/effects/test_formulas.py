@@ -232,14 +232,17 @@ def test_a_key_that_an_effect_does_not_have_is_told_with_those_it_has(kind: str)
     assert len(str(error.value)) < 300
 
 
+def constants(text: str, b: float) -> dict[str, float]:
+    return {"b": b, "n": 0.5} if "^n" in text else {"b": b}
+
+
 @pytest.mark.parametrize(
     "text", ["-b*Omega*sqrt(abs(Omega))", "-b*Omega*abs(Omega)^n", "-b*sqrt(4*speed)*Omega/2"]
 )
 @pytest.mark.parametrize("method", ["dopri5", "dop853", "auto"])
 def test_a_root_of_the_speed_is_crossed(text: str, method: str) -> None:
     # Beyond its kink the speed of a step's side is negative, and the step used to shrink to nothing.
-    given = {"b": 0.01} | ({"n": 0.5} if "^n" in text else {})
-    drag = formula("torque", text, amplitudes=["b"], **given)
+    drag = formula("torque", text, amplitudes=["b"], **constants(text, 0.01))
     pendulum, t = udd.Pendulum(0.5, k0=0.01, effects=[drag]), np.arange(0.0, 20.0, 0.02)
 
     def rates(_t: float, s: np.ndarray) -> list[float]:
@@ -256,16 +259,12 @@ def test_a_law_with_a_root_of_the_speed_is_fitted(text: str) -> None:
     t, noise = np.arange(0.0, 40.0, 0.04), 2e-3 * np.random.default_rng(1).standard_normal(1000)
 
     def own(b: float) -> udd.Model:
-        return udd.Model(
-            ["x", "v"], ["v", f"-x - 0.02*v {text}"], {"b": b} | ({"n": 0.5} if "^n" in text else {})
-        )
+        return udd.Model(["x", "v"], ["v", f"-x - 0.02*v {text}"], constants(text, b))
 
     x = udd.simulate(own(0.02), t, [1.0, 0.0]).state[:, 0]
     result = udd.fit(udd.Measurement(t, {"x": x + noise}), own(0.03), free=["b"])
     assert abs(result.parameters["b"] - 0.02) < 4 * result.errors["b"]
-    drag = formula(
-        "torque", text.replace("v", "Omega"), amplitudes=["b"], b=0.01, **({"n": 0.5} if "^n" in text else {})
-    )
+    drag = formula("torque", text.replace("v", "Omega"), amplitudes=["b"], **constants(text, 0.01))
     pendulum = udd.Pendulum(0.5, k0=0.01, effects=[drag])
     theta = udd.simulate(pendulum, t, [0.0, 1.0]).state[:, 1]
     measured = udd.Measurement(t, {"theta": theta + noise})
