@@ -131,11 +131,6 @@ impl Op {
         }
     }
 
-    /// Returns true if its first operand must not be negative.
-    fn needs_positive(self) -> bool {
-        matches!(self, Op::Binary(Binary::Power) | Op::Unary(Unary::Sqrt | Unary::Ln))
-    }
-
     /// Its name in a formula's text; for a value that is pushed, the kind of the value.
     pub fn name(self) -> &'static str {
         match self {
@@ -216,30 +211,6 @@ impl Expression {
                 self.ops.splice(at..at + old.len(), [new]);
             }
             at += 1;
-        }
-    }
-
-    /// Inserts `more` after each of these operations in an argument that must not be negative, as that of a root.
-    pub(crate) fn extend_in_roots(&mut self, old: Op, more: &[Op]) {
-        // The start of each number on the stack.
-        let mut starts: Vec<usize> = Vec::new();
-        let mut i = 0;
-        while i < self.ops.len() {
-            let op = self.ops[i];
-            let at = starts.len() - op.takes();
-            let start = starts.get(at).copied().unwrap_or(i);
-            if op.needs_positive() {
-                let end = starts.get(at + 1).copied().unwrap_or(i);
-                for k in (start..end).rev() {
-                    if self.ops[k] == old && !self.ops[k + 1..].starts_with(more) {
-                        self.ops.splice(k + 1..k + 1, more.iter().copied());
-                        i += more.len();
-                    }
-                }
-            }
-            starts.truncate(at);
-            starts.push(start);
-            i += 1;
         }
     }
 

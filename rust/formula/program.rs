@@ -149,7 +149,15 @@ impl<S: Scalar> Room<S> for [S] {
 impl Program {
     /// For these formulas.
     pub fn of<'a>(formulas: impl IntoIterator<Item = &'a Expression>) -> Self {
-        let mut graph = Graph::default();
+        Self::from_graph(Graph::default(), formulas)
+    }
+
+    /// For a formula in which state `size` is `|state|`, with its sign on the side where a step began.
+    pub fn with_size(formula: &Expression, size: usize, state: usize) -> Self {
+        Self::from_graph(Graph { size: Some((size, state)), ..Graph::default() }, [formula])
+    }
+
+    fn from_graph<'a>(mut graph: Graph, formulas: impl IntoIterator<Item = &'a Expression>) -> Self {
         let results: Vec<usize> = formulas.into_iter().map(|formula| graph.add(formula)).collect();
         graph.lower(&results)
     }
@@ -428,6 +436,8 @@ type Likeness = (&'static str, [u64; 6], [usize; 3]);
 struct Graph {
     made: Vec<Made>,
     known: HashMap<Likeness, usize>,
+    /// A state that is the absolute value of another one, on the side where a step began.
+    size: Option<(usize, usize)>,
 }
 
 /// The operands, of those on the stack, that the value of an operation depends on.
@@ -455,7 +465,7 @@ impl Graph {
                     of[1] = if k == 0 { at } else { of[1] };
                 }
             }
-            if op.needs_positive() {
+            if matches!(op, Op::Binary(Binary::Power) | Op::Unary(Unary::Sqrt | Unary::Ln)) {
                 of[0] = self.defined(of[0]);
             }
             stack.push(self.value(op, of));
@@ -481,6 +491,13 @@ impl Graph {
             Op::On(kink @ (Kink::Abs | Kink::Min | Kink::Max), side) => {
                 self.value(Op::Compared(kink, side), of)
             }
+            Op::Push(Leaf::State(n)) => match self.size {
+                Some((size, state)) if size == n => {
+                    let signed = self.value(Op::Push(Leaf::State(state)), [0; 3]);
+                    self.value(Op::Unary(Unary::Abs), [signed, 0, 0])
+                }
+                _ => i,
+            },
             Op::Unary(Unary::Neg) | Op::Binary(Binary::Mul | Binary::Div) if deepest > 0 => {
                 let mut new = of;
                 for k in 0..op.takes() {

@@ -60,9 +60,6 @@ impl Formula {
         // The side of |Omega| is known, so that its kink is landed on.
         function
             .replace(&[Op::Push(Leaf::State(OMEGA)), Op::Unary(Unary::Abs)], Op::Push(Leaf::State(SPEED)));
-        // Beyond the kink the speed of its side is negative, and a root has no value.
-        let size = [Op::Push(Leaf::State(OMEGA)), Op::Unary(Unary::Abs), Op::Defined];
-        function.extend_in_roots(Op::Push(Leaf::State(SPEED)), &size);
         let uses = |leaf| function.ops().contains(&Op::Push(leaf));
         let in_spline = |i| {
             function.ops().iter().any(|op| matches!(op, Op::Spline(own) if own.parameters().contains(&i)))
@@ -93,7 +90,7 @@ impl Formula {
                 "mixes what only a disk has (W, R, a moving contact) with theta or length".to_owned(),
             );
         }
-        let function = Program::of([&function]);
+        let function = Program::with_size(&function, SPEED, OMEGA);
         Ok(Self { name: name.to_owned(), slot, function, parameters: parameters.to_vec(), bodies })
     }
 
