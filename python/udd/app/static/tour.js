@@ -8,6 +8,9 @@ export class Tour {
   constructor(steps) {
     this.steps = steps;
     this.words = list("tour_steps");
+    // On a narrow screen the page scrolls to what a step shows, again as that grows, until the reader acts.
+    this.sized = new ResizeObserver(([{ target }]) => target.scrollIntoView({ block: "start" }));
+    for (const act of ["pointerdown", "wheel", "keydown"]) addEventListener(act, () => this.sized.disconnect(), { passive: true });
     $("tour-begin").addEventListener("click", () => this.go(0));
     $("tour-next").addEventListener("click", () => this.go(this.at + 1));
     $("tour-back").addEventListener("click", () => this.go(this.at - 1));
@@ -29,8 +32,8 @@ export class Tour {
     const shown = this.steps[this.at]();
     $("tour-next").focus();
     document.body.style.setProperty("--tour", `${$("tour").offsetHeight + 16}px`);
-    // On a narrow screen the page scrolls: what the step speaks of must stand above this box.
-    shown?.scrollIntoView({ block: "nearest" });
+    this.sized.disconnect();
+    if (shown) this.sized.observe(shown);
   }
 
   end() {
