@@ -202,8 +202,9 @@ where
 
     /// A point of lower cost, on the way of the full step.
     ///
-    /// A step that does not lower the cost is shortened: along what the data hardly determine, the misfits'
-    /// curvature makes it too long, and damping would all but stop it. Then it is damped ever more strongly.
+    /// A step that does not lower the cost, or leaves a parameter's range, is shortened. Along what the data hardly
+    /// determine, the misfits' curvature makes it too long, and damping would all but stop it. Then it is damped
+    /// ever more strongly.
     fn lower(
         &self,
         here: &Iterate<D, M>,
@@ -216,7 +217,12 @@ where
         let mut length = 1.0;
         for trial in 1..=MOST_TRIALS {
             let moved = self.moved(&here.point, &step, length);
-            match self.look(moved, std::mem::take(&mut room), here.cost.total()) {
+            let looked = if self.free.iter().all(|free| free.allows(moved.get(free))) {
+                self.look(moved, std::mem::take(&mut room), here.cost.total())
+            } else {
+                Ok(Err(std::mem::take(&mut room)))
+            };
+            match looked {
                 Ok(Ok(lower)) => {
                     *damping = if *damping < 1e-2 { 0.0 } else { *damping * 0.1 };
                     return Ok(Some(lower));

@@ -74,9 +74,17 @@ pub struct FreeParameter {
     pub mean: f64,
     /// Standard deviation of the prior; infinite for none.
     pub sd: f64,
+    /// The least and the largest value for which the model is defined.
+    pub range: (f64, f64),
 }
 
 impl FreeParameter {
+    /// Returns `true` if the model is defined for a value.
+    pub fn allows(&self, value: f64) -> bool {
+        let (least, largest) = self.range;
+        (least..=largest).contains(&value)
+    }
+
     /// Whether frames of this film depend on it.
     pub fn acts_on(&self, film: usize) -> bool {
         self.film.is_none_or(|own| own == film)

@@ -44,6 +44,7 @@ struct Free {
     film: Option<usize>,
     mean: f64,
     sd: f64,
+    range: (f64, f64),
 }
 
 /// As `udd.fitting.estimator_input.EstimatorInput`.
@@ -115,7 +116,7 @@ impl TryFrom<Free> for FreeParameter {
             "clock" => Role::Clock,
             other => return Err(PyValueError::new_err(format!("unknown role {other:?}"))),
         };
-        Ok(Self { role, film: free.film, mean: free.mean, sd: free.sd })
+        Ok(Self { role, film: free.film, mean: free.mean, sd: free.sd, range: free.range })
     }
 }
 

@@ -73,8 +73,10 @@ fn problem(family: DiskFamily, record: Record<3>, free: Vec<FreeParameter>) -> P
     Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance, known: None }
 }
 
+const UNLIMITED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
 fn free(role: Role, mean: f64, sd: f64) -> FreeParameter {
-    FreeParameter { role, film: None, mean, sd }
+    FreeParameter { role, film: None, mean, sd, range: UNLIMITED }
 }
 
 /// One film's point.
@@ -311,6 +313,19 @@ fn the_score_foretells_the_fit() {
     assert!((drop - gained).abs() < 0.1 * gained.max(1.0), "{drop} {gained}");
 }
 
+/// A minimum outside a parameter's range is approached, and not reached.
+#[test]
+fn a_parameter_stays_within_its_range() {
+    let family = family(&[(Kind::Relaxation, Some(Momentum::Constraint))]);
+    let (record, states) = film(&family, &[PAPER.as_slice(), &[0.3]].concat(), 250, 5);
+    let limited = FreeParameter { range: (0.5, 2.0), ..free(Role::Model(6), 1.0, f64::INFINITY) };
+    let start = point(states, [PAPER.as_slice(), &[1.0]].concat());
+    let solution =
+        problem(family, record, vec![limited]).solve(start, &Options::default(), &CancelFlag::new()).unwrap();
+    let b = solution.point.sets[0].model[6];
+    assert!((0.5..0.7).contains(&b), "{b}");
+}
+
 /// The next solve reuses a linearisation at its start, and only there.
 #[test]
 fn a_known_linearisation_is_not_made_again() {
@@ -360,7 +375,7 @@ fn filled_up<const D: usize>(
     record.linked[40] = false;
     record.information[20] = SMatrix::zeros();
     record.memory[0] = 0.3;
-    let free = |p| FreeParameter { role: Role::Model(p), film: None, mean: 0.0, sd: f64::INFINITY };
+    let free = |p| free(Role::Model(p), 0.0, f64::INFINITY);
     let family = family.filled::<D>();
     let estimator = Estimator {
         sensor: FormulaSensor::of(&family),
@@ -448,7 +463,7 @@ fn derivatives_of_many_states_equal_finite_differences() {
     let equations: Vec<String> = (0..D).map(equation).collect();
     let texts: Vec<&str> = equations.iter().map(String::as_str).collect();
     let family = FormulaFamily::<D>::parse(&names("x", D), &texts, &names("p", 14), &[]).unwrap();
-    let free = |p| FreeParameter { role: Role::Model(p), film: None, mean: 0.0, sd: f64::INFINITY };
+    let free = |p| free(Role::Model(p), 0.0, f64::INFINITY);
     let record = Record::<D> {
         t: vec![0.0, 0.1],
         seen: vec![SVector::zeros(); 2],

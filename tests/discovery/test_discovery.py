@@ -286,7 +286,7 @@ def test_what_comes_nearest_is_told_but_not_added():
     assert result.verdict == "effect present, form not identified"
     assert result.effects == []
     assert result.ratio == (1.0, 1.0, 1.0)
-    assert {"quadratic drag", "cubic drag"} & {nearby.title for nearby in result.rejected}
+    assert any("drag" in nearby.title for nearby in result.rejected)
     for close in result.rejected:
         assert close.why == "chance"
         assert close.p >= confirmation.ALPHA

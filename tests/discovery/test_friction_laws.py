@@ -118,9 +118,11 @@ def test_scanned_values_score_as_their_full_derivatives_do():
         "threshold_drag",
         "warming_friction",
         "dry_brake",
+        "two_brakes",
         "saturating",
+        "eddy_brake",
     }
-    assert len(strongest) == 7  # two places of one brake
+    assert len(strongest) == 10  # two places of each brake but the dry one
     assert number > 40
     for item in strongest:
         # Within a frame the motion is followed at a few places.
@@ -224,3 +226,18 @@ def test_a_length_that_drifts_is_no_torque_over_the_angle(seed):
     # g L/L^2 falls by g/L times the growth: in the unit of the fit, an inertia of 0.25 m^2 at 0.5 m.
     assert pull.parameters["a"] == pytest.approx(-9.81 * 0.5 * 0.02 / 60, rel=0.1)
     assert "effects of time and of amplitude are confounded" in discovery.doubts[0]
+
+
+def test_a_brake_on_both_sides_is_not_identified_on_one():
+    """Two magnets take as much energy from each swing as one of twice their strength."""
+    t = np.arange(0, 40, 0.05)
+    text = "a*(exp(-((theta - 1.4)/0.2)^2) + exp(-((theta + 1.4)/0.2)^2))"
+    truth = udd.Pendulum(0.67, k0=0.009, effects=[E.formula("friction", text, amplitudes=["a"], a=0.0158)])
+    theta = udd.simulate(truth, t, [0.0, 2.0]).state[:, 1]
+    measured = udd.Measurement(t, {"theta": theta + 5e-3 * np.random.default_rng(1).standard_normal(len(t))})
+    result = udd.discover(measured, udd.Pendulum(0.67, k0=0.008))
+    (both,) = result.effects
+    assert both.effect.name == "two_brakes"
+    assert both.parameters["c"] == pytest.approx(1.4, abs=0.02)
+    assert "local_brake" in {rival.effect.name for rival in result.alternatives}
+    assert result.verdict == "effect present, form not identified"

@@ -12,7 +12,17 @@ import pytest
 
 import udd
 from udd.discovery import hypotheses
-from udd.discovery.hypotheses import Hypothesis, contains, log_evidence, log_prior, named, ranked, rivals
+from udd.discovery.hypotheses import (
+    Hypothesis,
+    contains,
+    lead,
+    log_evidence,
+    log_prior,
+    named,
+    ranked,
+    rivals,
+    simplest,
+)
 from udd.discovery.results import AddedEffect
 from udd.discovery.scoring.candidate import Candidate
 from udd.discovery.symbolic.expressions import is_single_term, length, read
@@ -155,6 +165,33 @@ def test_a_spline_is_a_rival_of_splines_alone():
     assert rivals(hypothesis(100.0, CUBIC, curve=SimpleNamespace()), [spline], KNOWN) == [spline]
 
 
+def test_an_effect_that_gains_less_than_ten_nats_is_left_out():
+    both, law, other = (
+        hypothesis(100.0, QUADRATIC, COULOMB),
+        hypothesis(93.0, QUADRATIC),
+        hypothesis(95.0, CUBIC),
+    )
+    assert simplest([both, other, law]) == [law, both, other]
+    assert simplest([both, other]) == [both, other]
+    clear = hypothesis(104.0, QUADRATIC, COULOMB)
+    assert simplest([clear, law]) == [clear, law]
+
+
+def test_a_spline_over_another_coordinate_is_a_rival_of_a_formula():
+    def over(name: str) -> Any:
+        return SimpleNamespace(coordinates=[SimpleNamespace(name=name)])
+
+    formula = hypothesis(100.0, power(0.3), formula="2.0*tanh(3.0*x)", curve=over("load"))
+    speed, same = (hypothesis(86.0, QUADRATIC, curve=over(name)) for name in ("|Omega|", "load"))
+    far = hypothesis(79.0, QUADRATIC, curve=over("|Omega|"))
+    assert rivals(formula, [formula, speed, same, far], KNOWN) == [speed]
+    assert lead(formula, speed) == 4.0  # without the ten nats that a spline costs more
+    assert lead(formula, same) == 14.0
+    of_speed = hypothesis(100.0, power(0.3), formula="2.0*tanh(3.0*x)", curve=over("|Omega|"))
+    torque = hypothesis(86.0, QUADRATIC, curve=over("Omega"))  # the same coordinate, with its sign
+    assert rivals(of_speed, [torque], KNOWN) == []
+
+
 def test_priors_count_terms_symbols_and_splines():
     single = -math.log(30)
     over_speed, over_time = (
@@ -234,7 +271,7 @@ def added(effect: udd.effects.Effect, **more: Any) -> AddedEffect:
     return AddedEffect(**(values | more))
 
 
-def final(**values: tuple[float, float]) -> Any:
+def final(*, missing: bool = False, **values: tuple[float, float]) -> Any:
     """A fit of which only the numbers count."""
     order = {name.replace("__", "."): value for name, (value, _sd) in values.items()}
     covariance = np.diag([sd**2 for _value, sd in values.values()])
@@ -242,7 +279,13 @@ def final(**values: tuple[float, float]) -> Any:
     record = SimpleNamespace(film=np.zeros(500, int), t=t)
     states = np.column_stack([np.sin(t), 0.01 * np.sin(t), 0.04 + 0.01 * np.cos(t), t])
     return SimpleNamespace(
-        parameters=order, covariance=covariance, model=udd.Disk(0.04), record=record, states=states
+        parameters=order,
+        covariance=covariance,
+        model=udd.Disk(0.04),
+        record=record,
+        states=states,
+        doubts=SimpleNamespace(missing=missing),
+        widened=1.0,
     )
 
 
@@ -327,6 +370,8 @@ def test_each_doubt_leaves_the_form_open(monkeypatch):
     assert "no law of one term" in doubts_of([added(effect, is_law=False)], numbers, gain, 1000)[0]
     weak = final(quadratic_drag__c=(0.01, 0.01))
     assert "do not determine c" in doubts_of([clear], weak, gain, 1000)[0]
+    unclear = final(missing=True, quadratic_drag__c=(0.01, 0.001))
+    assert "something else is missing" in doubts_of([clear], unclear, gain, 1000)[0]
     # Where free runs gain little the frames' own likelihood may show it: 1000 numbers at half their cost.
     assert doubts_of([clear], numbers, (0.99, 0.98, 1.01), 1000) == []
     little = added(effect, ratio=(0.99, 0.98, 1.01))
@@ -351,6 +396,7 @@ def test_friction_over_the_time_alone_leaves_the_form_open(monkeypatch):
         (True, False, [], True, False, "effect present, form not identified"),
         (False, False, [], True, False, "effect present, form not identified"),
         (False, True, [], False, False, "fits the first part, not confirmed"),
+        (False, True, [], True, False, "effect present, form not identified"),
         (False, False, [], False, True, "search not finished"),
         (False, False, [], False, False, "nothing missing"),
     ],

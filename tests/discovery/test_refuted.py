@@ -23,7 +23,7 @@ class Located:
 
 def trial(name: str, curve: str = "") -> Any:
     fit = SimpleNamespace(level=4)
-    title = SimpleNamespace(title=name)
+    title = SimpleNamespace(title=name, effect=SimpleNamespace(name=name))
     located = Located(curve) if curve else None
     return SimpleNamespace(
         candidates=[title], curve=located, formula=None, fit=fit, names=[], needed=True, is_curve=bool(curve)

@@ -204,6 +204,14 @@ def test_nothing_missing_is_said(pages: dict[str, str]) -> None:
     assert "with the effect" not in text
 
 
+def test_a_law_that_the_library_lacks_is_named_by_its_title():
+    discovery = discovered.pendulum()
+    (wave,) = waves(udd.Pendulum(1.0), [0.3])
+    added = replace(discovery.effects[0], effect=wave.effect, title=wave.title, curve=None)
+    named = replace(discovery, effects=[added], alternatives=[], verdict="effect identified")
+    assert words.verdict(named) == "There is a wave of frequency 0.3 in torque."
+
+
 def test_a_model_that_does_not_explain_is_not_called_complete() -> None:
     calm = discovered.nothing()
     assert "Nothing is missing" in words.verdict(calm)

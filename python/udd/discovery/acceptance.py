@@ -35,7 +35,7 @@ from udd.fitting import (
 )
 from udd.fitting.parameters import Free
 
-from .hypotheses import Hypothesis, log_evidence, log_prior, named, ranked, rivals
+from .hypotheses import Hypothesis, lead, log_evidence, log_prior, named, ranked, rivals, simplest
 from .results import Alternative
 from .score_rounds import ScoreRound
 from .thresholds import ALPHA, EVIDENCE_MARGIN, ROUGH_MARGIN, Confirmation
@@ -193,7 +193,8 @@ class Acceptance:
         """
         trials = [t for t in trials if t.fit.level >= current.part.level and t.needed]
         while trials:
-            order = named(ranked(self.hypotheses(current, trials, scores)), self.known_parameters)
+            order = ranked(self.hypotheses(current, trials, scores))
+            order = simplest(named(order, self.known_parameters))
             most = max((h.log_z for h in order), default=0.0)
             refuted: list[TrialFit] = []
             for chosen in (h for h in order if h.log_z >= most - EVIDENCE_MARGIN):
@@ -390,7 +391,7 @@ class Acceptance:
                 named = {p: f"{theirs.effect.name}.{p}" for p in theirs.effect.parameters}
                 fitted = other.again.fit.parameters
                 effect = theirs.effect.replace(**{p: fitted[n] for p, n in named.items() if n in fitted})
-                nats = chosen.log_z - other.log_z
+                nats = lead(chosen, other)
                 alternative = Alternative(
                     chosen_form.effect.name, effect, theirs.title, theirs.effect.equation, nats, likeness
                 )

@@ -203,20 +203,54 @@ def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[
     return list(order)
 
 
+def simplest(order: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Put a hypothesis first if the leading one only adds effects to it, and gains less than ten nats."""
+    # Without this, a disk with drag above 4 rad/s gets a negative cubic drag, too.
+    for other in order[1:]:
+        adds = {c.effect.name for c in other.trial.candidates} < {
+            c.effect.name for c in order[0].trial.candidates
+        }
+        if adds and other.log_z > order[0].log_z - EVIDENCE_MARGIN:
+            return [other, *(h for h in order if h is not other)]
+    return list(order)
+
+
+def lead(chosen: Hypothesis, other: Hypothesis) -> float:
+    """Return the number of nats by which one hypothesis leads another.
+
+    A spline over another coordinate than a formula's does not pay the ten nats that it costs more than a law:
+    it is a rival of the coordinate, not of the form.
+    """
+    # Without this, two brakes of a pendulum at 1 and -1 rad are identified as friction over the load.
+    waived = EVIDENCE_MARGIN if _doubts_the_coordinate(chosen, other) else 0.0
+    return chosen.log_z - other.log_z - waived
+
+
+def _doubts_the_coordinate(chosen: Hypothesis, other: Hypothesis) -> bool:
+    """Return True for a spline over another coordinate than a formula's."""
+    if chosen.trial.formula is None or not other.trial.is_curve:
+        return False
+    coordinates = [
+        {c.name.strip("|") for c in h.trial.curve.coordinates} for h in (chosen, other) if h.trial.curve
+    ]
+    return coordinates[0] != coordinates[1]
+
+
 def rivals(
     chosen: Hypothesis, others: Sequence[Hypothesis], known_parameters: Sequence[str]
 ) -> list[Hypothesis]:
     """Return the hypotheses that the data cannot distinguish from the chosen one.
 
-    They are within ten nats of it. These are no rivals: splines, if a law was chosen; formulas that the
-    chosen law or a better rival contains; laws that contain it with more constants and no gain.
+    They are at most ten nats behind. If a law was chosen, a spline is a rival only if it doubts a formula's
+    coordinate. A formula that the chosen law or a better rival contains is no rival. Nor is a law that
+    contains the chosen one, with more constants and no gain.
     """
     result: list[Hypothesis] = []
     for other in others:
-        if other is chosen or other.log_z < chosen.log_z - EVIDENCE_MARGIN:
+        if other is chosen or lead(chosen, other) > EVIDENCE_MARGIN:
             continue
         if other.trial.is_curve:
-            if chosen.trial.is_curve:
+            if chosen.trial.is_curve or _doubts_the_coordinate(chosen, other):
                 result.append(other)
             continue
         wider = other.constants > chosen.constants

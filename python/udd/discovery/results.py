@@ -254,7 +254,8 @@ class Discovery(Drawable):
     comparisons : list of int
         Count of candidates and curves in each round, every frequency included.
     split : float
-        Start of the held-out data, s; of the first measurement.
+        Start of the held-out data, s; of the first measurement. They are the last part of each measurement,
+        or its first part if only the rest shows an effect.
     rejected : list of RejectedEffect
         If an effect is present but none passes: those that come closest, the best first. Also effects that
         passed but were not confirmed.
@@ -340,6 +341,14 @@ class Discovery(Drawable):
     def horizon(self) -> float | None:
         """Horizon of `ratio`, s; None for the whole held-out part."""
         return self.error_before.horizon
+
+    @property
+    def held_out_span(self) -> tuple[float, float]:
+        """Begin and end of the held-out frames of the first measurement, s."""
+        trained, all_frames = self.trained.record, self.fit.record
+        first = float(trained.clock[0])
+        end = first if first > self.split else float(all_frames.clock[all_frames.film == 0][-1])
+        return self.split, end
 
     @property
     def model(self) -> Model:
@@ -452,6 +461,7 @@ class Discovery(Drawable):
             "held_out_ratio": _named(self.ratio),
             "horizon_s": self.horizon,
             "held_out_from_s": self.split,
+            "held_out_to_s": self.held_out_span[1],
             "held_out_records": list(self.held_out),
             "undetermined": list(self.undetermined),
             "baseline": self.baseline.numbers(),

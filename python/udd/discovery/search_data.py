@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,11 @@ class SearchData:
         """The training frames and the whole record; with held-out measurements only the first."""
         training = self.record.part(self.train)
         return (training,) if self.held_out else (training, self.record)
+
+    def exchanged(self, share: float) -> SearchData:
+        """Return the same data with the last part of each measurement for training."""
+        train = ~self.record.first(1.0 - share)
+        return replace(self, train=train, split=float(self.record.clock[0]))
 
 
 def prepared(

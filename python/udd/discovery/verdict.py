@@ -9,6 +9,7 @@ import numpy as np
 from udd.discovery.scoring.candidate import changes_with_time, is_driven
 from udd.discovery.validation.by_record import contested
 from udd.discovery.validation.held_out_errors import Ratio
+from udd.effects.user_defined import is_spline
 from udd.fitting import Fit
 from udd.fitting.diagnostics import readings
 
@@ -28,9 +29,10 @@ def verdict_of(
     """Return the first verdict that holds, from the least to the most certain.
 
     A form is open if another one explains as much, or if the misfit that remains is not noise. An effect is
-    unconfirmed if it passed in the training part, but free runs over the rest do not confirm it.
+    unconfirmed if it passed in the training part, but free runs over the rest do not confirm it. If even then
+    the model clearly lacks something, an effect is present.
     """
-    if not added and unconfirmed:
+    if not added and unconfirmed and not open_form:
         return "fits the first part, not confirmed"
     if open_form or doubts:
         return "effect present, form not identified"
@@ -60,12 +62,16 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
         if _periods(effect, final) < _PERIODS:
             result.append(f"{effect.title}: the record contains fewer than two of its periods.")
         elif not effect.is_law:
-            result.append(f"{effect.title} is a curve, written as a formula: no law of one term.")
+            written = "" if is_spline(effect.effect) else ", written as a formula"
+            result.append(f"{effect.title} is a curve{written}: no law of one term.")
         elif open_constants := undetermined(effect, final):
             result.append(f"{effect.title}: the data do not determine {', '.join(open_constants)}.")
     # A sensor that reads in coarse steps causes spurious curves, too.
     if any(effect.curve is not None for effect in added) and any(effect.coarse for effect in readings(final)):
         result.append("A sensor reads in coarse steps, and such errors make curves too.")
+    # Without this a friction over 1 + (Omega/s)^2 is identified as one that saturates with the speed.
+    if added and final.doubts.missing:
+        result.append("The residuals show that something else is missing.")
     if added and not has_size(ratio) and not any(_predicts(effect.ratio, held_out) for effect in added):
         result.append("Held-out data gain less than 2 %, and less than 10 nats.")
     return result
@@ -94,7 +100,8 @@ def undetermined(added: AddedEffect, final: Fit) -> list[str]:
 
     A constant with a natural zero must be more than three standard errors from it. Amplitudes that belong
     together, such as those of a sine and a cosine, count as one. A place or a phase has no natural zero:
-    three standard errors must be less than half the range of its coordinate.
+    three standard errors must be less than half the range of its coordinate. The errors are those before a
+    missing effect inflates them.
     """
     order = list(final.parameters)
     result = []
@@ -105,8 +112,9 @@ def undetermined(added: AddedEffect, final: Fit) -> list[str]:
         names = [f"{added.effect.name}.{p}" for p in group]
         if group[0] in ranges:
             row = order.index(names[0])
-            is_determined = _DETERMINED * np.sqrt(final.covariance[row, row]) < ranges[group[0]] / 2
+            error = np.sqrt(final.covariance[row, row]) / final.widened
+            is_determined = _DETERMINED * error < ranges[group[0]] / 2
         else:
-            is_determined = wald(final, names) >= _DETERMINED**2
+            is_determined = wald(final, names) * final.widened**2 >= _DETERMINED**2
         result += [] if is_determined else group
     return result

@@ -42,7 +42,8 @@ class Parameter:
     grid : tuple of float
         Values of a shape that a scan of candidates tries.
     along : str
-        Kind of a scanned number: ``"angle"``, ``"speed"``, ``"power"`` or ``"duration"``.
+        Kind of a scanned number: ``"angle"``, ``"side"`` (an angle's size), ``"speed"``, ``"power"`` or
+        ``"duration"``.
 
     See Also
     --------

@@ -22,7 +22,7 @@ from .minimum import SolveError
 from .model_error_schedule import with_negligible_model_error
 from .noise import stated
 from .noise_estimation import solve_with_noise
-from .parameters import free_parameters, names_of
+from .parameters import free_parameters, names_of, shapes
 from .problem import Point, Problem, levels, one_model_each, start_point
 from .record import Record, record_of
 from .sensor import is_encoder
@@ -177,7 +177,34 @@ def fit_record(
     start = start_point(models, measurements, record)
     if search and models[0].inputs:  # a fit finds the model error itself
         problem = _with_input_noise(problem, start)
-    return solve_with_noise(problem, start)
+    return solve_with_noise(problem, start) if search else _shapes_last(problem, start)
+
+
+def _shapes_last(problem: Problem, start: Point) -> Fit:
+    """Fit with all parameters free; if that ends badly, also with the shapes of effects freed at the end.
+
+    A large model error hardly determines a shape: the first steps may lead far away from a good start.
+    """
+    result, failure = None, None
+    try:
+        result = solve_with_noise(problem, start)
+    except SolveError as error:
+        failure = error
+    names = {name for model in problem.models for name in shapes(model)}
+    first = tuple(f for f in problem.free if f.base not in names)
+    if len(first) < len(problem.free) and not (result and result.problem.has_smallest_model_error):
+        try:
+            held = solve_with_noise(replace(problem, free=first), start)
+            left = replace(problem, schedule=problem.schedule[held.level :])
+            again = solve_with_noise(left, held.point)
+            if result is None or again.evidence > result.evidence:
+                return replace(again, problem=replace(again.problem, schedule=problem.schedule))
+        except SolveError:
+            pass
+    if result is None:
+        assert failure is not None
+        raise failure
+    return result
 
 
 def _with_input_noise(problem: Problem, start: Point) -> Problem:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from udd import _core
+from udd.effects.user_defined import UNLIMITED
 from udd.errors import FitError
 from udd.models import Model
 
@@ -30,6 +31,8 @@ class Free:
         Mean and standard deviation of the prior. Infinite means no prior.
     film : int or None
         The film that it belongs to. None if all share it.
+    range : tuple of float
+        Least and largest value for which the model is defined.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Free:
     mean: float
     sd: float
     film: int | None = None
+    range: tuple[float, float] = UNLIMITED
 
     @property
     def base(self) -> str:
@@ -87,7 +91,8 @@ def free_parameters(
                 continue  # a drive of zero stays fixed
             label = name if film is None else f"{name}[{film}]"
             mean, sd = of.parameters[name], spread.get(name, np.inf)
-            result.append(Free(label, "model", order.index(name), mean, sd, film))
+            limits = shapes(of).get(name, UNLIMITED)
+            result.append(Free(label, "model", order.index(name), mean, sd, film, limits))
     for film in range(len(models)):
         for name in wanted:
             role, index = ("clock", 0) if name == "clock" else ("camera", cameras.index(name))
@@ -134,6 +139,16 @@ def known_camera(kind: str, meta: Mapping[str, Any]) -> list[float]:
             )
         camera |= {"middle_y": y, "middle_z": z}
     return list(camera.values())
+
+
+def shapes(model: Model) -> dict[str, tuple[float, float]]:
+    """Return the range of each parameter that gives an effect of a model its shape."""
+    return {
+        f"{effect.name}.{p.name}": p.range
+        for effect in model.effects
+        for p in effect.spec.parameters
+        if p.role != "amplitude"
+    }
 
 
 def _amplitudes(model: Model) -> list[str]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from udd import _core
 from udd._util.one_line import OneLine
+from udd.effects.user_defined import UNLIMITED
 from udd.errors import FitError
 from udd.measurement import Measurement
 from udd.models import Model, profile_of
@@ -19,7 +20,7 @@ from udd.models.formula_model import FormulaModel
 from .estimator_input import EstimatorInput, FilmParameters, Observations
 from .formula_models import driven
 from .noise import Noise
-from .parameters import Free, known_camera
+from .parameters import Free, known_camera, shapes
 from .record import Record
 
 Array = NDArray[np.float64]
@@ -71,8 +72,12 @@ class Problem(OneLine):
 
     def freeing(self, priors: Mapping[str, tuple[float, float]]) -> Problem:
         """Return the problem with more parameters of the model free: name, and mean and s.d. of the prior."""
-        order = list(self.models[0].parameters)
-        more = (Free(name, "model", order.index(name), *prior) for name, prior in priors.items())
+        model = self.models[0]
+        order, limits = list(model.parameters), shapes(model)
+        more = (
+            replace(Free(name, "model", order.index(name), *prior), range=limits.get(name, UNLIMITED))
+            for name, prior in priors.items()
+        )
         return replace(self, free=(*self.free, *more))
 
     def of_states(self, record: Record) -> Problem:

@@ -182,7 +182,9 @@ def held_back(discovery: Discovery) -> str:
     m = discovery.measurement
     if discovery.held_out:
         return f"Whole records, by number {', '.join(map(str, discovery.held_out))},"
-    return f"The last {100 * (1 - (discovery.split - m.t[0]) / m.duration):.0f} % of the record"
+    begin, end = discovery.held_out_span
+    which = "first" if end < m.t[-1] else "last"
+    return f"The {which} {100 * (end - begin) / m.duration:.0f} % of the record"
 
 
 def _errors(discovery: Discovery) -> Section:

@@ -15,6 +15,7 @@ from udd._util import value_text
 from udd._util.small_units import small_unit
 from udd.discovery.thresholds import SAME as IDENTICAL
 from udd.discovery.validation.held_out_errors import reaches_noise_floor
+from udd.effects.user_defined import FormulaSpec
 from udd.effects.user_defined import is_spline as is_spline
 
 if TYPE_CHECKING:
@@ -166,6 +167,8 @@ def _meanings(added: AddedEffect, discovery: Discovery) -> list[str]:
         if a.likeness > IDENTICAL and a.instead_of == added.effect.name
     ]
     sentences = [effect_sentence(e) for e in [added.effect, *same]]
+    if added.curve is None and isinstance(added.effect.spec, FormulaSpec) and enters(added.effect):
+        sentences[0] = f"there is {added.title}"  # the meaning of a formula names only its slot
     if added.curve is not None:  # the meaning says where, the curve says with what
         sentences[0] += f", depending on {' and '.join(along(c.name) for c in added.curve.coordinates)}"
     return list(dict.fromkeys(sentences))

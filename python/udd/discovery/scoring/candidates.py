@@ -78,7 +78,7 @@ def drifting_pull(model: Model) -> list[Candidate]:
     # Without this a drift of the length is called a torque over the angle: a swing decays in that time.
     if "theta" not in model.state_names:
         return []
-    title = "gravity's pull that changes with time"
+    title = "a pull of gravity that changes with time"
     listed = laws(model, "torque", "-{a}*t*sin(theta)", title, {"a": EITHER}, name="drifting_pull")
     return [replace(candidate, usual=False) for candidate in listed]
 

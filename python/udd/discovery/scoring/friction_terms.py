@@ -140,15 +140,28 @@ def one_way(model: Model, speed: Array) -> list[Candidate]:
 
 
 def further() -> tuple[FormulaSpec, ...]:
-    """Describe frictions that the library lacks: dry near an angle, and saturating."""
-    text, brake = "-a*exp(-(2*sin((beta - c)/2)/s)^2)*tanh(Omega/0.05)", (0.0, np.inf)
-    ranges = {"a": brake, "s": (1e-3, np.inf)}
-    local = written("torque", text, "dry_brake", "dry friction near an angle", ["a"], ranges, ("a", "c", "s"))
-    ranges, title = {"a": brake, "b": (1e-3, np.inf)}, "friction that saturates with the speed"
-    bounded = written("torque", "-a*tanh(Omega/b)", "saturating", title, ["a"], ranges, ("a", "b"))
-    (a, c, s), (most, b) = local.parameters, bounded.parameters
-    place = replace(c, role="scanned", along="angle")
+    """Describe frictions that the library lacks, each with a scanned number."""
+    brake, size = (0.0, np.inf), (1e-3, np.inf)
+
+    def near(name: str, title: str, at: str, turn: str, along: str) -> FormulaSpec:
+        ranges, names = {"a": brake, "s": size}, ("a", "c", "s")
+        spec = written("torque", f"-a*({at})*{turn}", name, title, ["a"], ranges, names)
+        a, c, s = spec.parameters
+        width = replace(s, role="shape", grid=_ANGLES)
+        return replace(spec, parameters=(a, replace(c, role="scanned", along=along), width))
+
+    def beyond(name: str, title: str, text: str) -> FormulaSpec:
+        spec = written("torque", text, name, title, ["a"], {"a": brake, "b": size}, ("a", "b"))
+        a, b = spec.parameters
+        return replace(spec, parameters=(a, replace(b, role="scanned", along="speed")))
+
+    here, there = (f"exp(-(2*sin((beta {sign} c)/2)/s)^2)" for sign in "-+")
+    both = near("two_brakes", "friction near an angle on both sides", f"{here} + {there}", "Omega", "side")
     return (
-        replace(local, parameters=(a, place, replace(s, role="shape", grid=_ANGLES))),
-        replace(bounded, parameters=(most, replace(b, role="scanned", along="speed"))),
+        near("dry_brake", "dry friction near an angle", here, "tanh(Omega/0.05)", "angle"),
+        # Without this, two magnets at 1.4 and -1.4 rad are identified as one at -1.4 rad.
+        replace(both, bodies=tuple(body for body in both.bodies if body == "pendulum")),
+        beyond("saturating", "friction that saturates with the speed", "-a*tanh(Omega/b)"),
+        # Without this, a magnet's brake is identified as friction that saturates.
+        beyond("eddy_brake", "brake by eddy currents", "-a*Omega/(1 + (Omega/b)^2)"),
     )

@@ -15,7 +15,6 @@ from udd._util import chi_squared
 from udd._util.one_line import OneLine
 from udd.fitting import Fit
 from udd.fitting.time_scale import motion_time_scale
-from udd.models import Model
 
 from .candidate import Candidate
 from .candidates import ripples
@@ -158,14 +157,13 @@ def strongest_ripple(fit: Fit) -> tuple[Scored | None, int]:
     the strongest lines. For a model without a drive the result is the strongest harmonic force in any
     equation.
     """
-    if fit.model.profile.dynamics.drive is None:
-        scored = _scan_waves(fit, fit.model)
-        return max(scored, key=lambda s: s.chi2, default=None), len(scored)
-    candidates = ripples(fit.model, fit.record.t)
-    lines = scan_ripples(fit, candidates[::2])
+    driven = fit.model.profile.dynamics.drive is not None
+    candidates = ripples(fit.model, fit.record.t) if driven else _waves(fit)
+    scored = scan_ripples if driven else _scan_waves
+    lines = scored(fit, candidates[::2])
     best = sorted(range(len(lines)), key=lambda k: -lines[k].chi2)[:_LINES]
     between = sorted({2 * k + side for k in best for side in (-1, 1)} & set(range(len(candidates))))
-    neighbours = scan_ripples(fit, [candidates[k] for k in between])
+    neighbours = scored(fit, [candidates[k] for k in between])
     return max(lines + neighbours, key=lambda s: s.chi2, default=None), len(candidates)
 
 
@@ -179,15 +177,20 @@ def scan_ripples(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
     return [score_of(c, g, i, a, scatter) for c, g, i, a in zip(candidates, *scores, strict=True)]
 
 
-def _scan_waves(fit: Fit, model: Model) -> list[Scored]:
-    moved, t = responses(fit), fit.record.t
+def _waves(fit: Fit) -> list[Candidate]:
+    """List harmonic forces of each equation, but at frequencies of the system or of the mains."""
+    model, t = fit.model, fit.record.t
     # As for the disk's drive ripple: forces much faster than the motion have no effect.
     fastest = min(0.25 / float(np.median(np.diff(t)[fit.record.linked])), 6.0 / motion_time_scale(fit))
     frequencies = np.arange(2.0 / np.ptp(t), fastest, 0.5 / np.ptp(t))
-    frequencies = frequencies[~belongs(frequencies, fit)]
     there = {effect.name for effect in model.effects}
-    candidates = [c for c in waves(model, frequencies) if c.effect.name not in there]
-    by_name = {slot.name: slot for slot in slots(model)}
+    return [c for c in waves(model, frequencies[~belongs(frequencies, fit)]) if c.effect.name not in there]
+
+
+def _scan_waves(fit: Fit, candidates: Sequence[Candidate]) -> list[Scored]:
+    """Score harmonic forces."""
+    moved = responses(fit)
+    by_name = {slot.name: slot for slot in slots(fit.model)}
 
     def column(candidate: Candidate) -> NDArray[np.float64]:
         phase = 2 * np.pi * candidate.effect.values[-1] * moved.t

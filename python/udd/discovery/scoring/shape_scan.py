@@ -88,7 +88,8 @@ def _values(along: str, model: Model, states: Array, duration: float, width: flo
         return [share * duration for share in DURATIONS]
     if along == "speed":
         return speeds(states[:, model.state_names.index("Omega")])
-    return places(states[:, model.state_names.index(model.angles[0])], width, angle=True)
+    visited = states[:, model.state_names.index(model.angles[0])]
+    return places(np.abs(visited) if along == "side" else visited, width, angle=True)
 
 
 def _column(moved: Responses, candidate: Candidate) -> Array | None:

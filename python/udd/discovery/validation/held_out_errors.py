@@ -54,8 +54,8 @@ class Errors:
     blocks : ndarray of int (starts,)
         Starts with the same number are resampled together.
     run : ndarray (n,)
-        Error of one free run over all held-out frames, from the end of the fit; NaN if a frame was not
-        observed.
+        Error of one free run over all held-out frames, from the fit's last frame before them; NaN if a frame
+        was not observed.
     run_blocks : ndarray of int (n,)
         Frames with the same number are resampled together.
     """
@@ -114,8 +114,9 @@ class Errors:
 def held_out_errors(fit: Fit, record: Record, held_out: NDArray[np.bool_], unit: float = 1.0) -> Errors:
     """Compute the errors of a fitted model on the held-out frames of `record`.
 
-    They are the last ones of each measurement, or all of some. Each free run starts from a state that is
-    filtered from the second of data before it; time stays absolute, in units of the motion's time scale.
+    They are the last or the first ones of each measurement, or all of some. Each free run starts from a state
+    that is filtered from the second of data before it; time stays absolute, in units of the motion's time
+    scale.
     """
     profile = fit.model.profile
     wanted = tuple(h * unit for h in profile.discovery.horizons)
@@ -300,14 +301,16 @@ def _settled(record: Record, frames: NDArray[np.int64], window: float) -> int:
 
 
 def _run(fit: Fit, record: Record, held_out: NDArray[np.bool_], window: float) -> Array:
-    """Compute errors of free runs from the last fitted frame of each measurement to its end, frame by frame.
+    """Compute errors of free runs over the held-out frames of each measurement, frame by frame.
 
-    For a whole held-out measurement, the run starts from the state that its first frames show.
+    A run starts at the last fitted frame before these. Without one it starts from the state that the first
+    held-out frames show.
     """
     errors = np.full(len(record.t), np.nan)
     for frames in _held_out_of(record, held_out):
         film = record.film[frames[:1]]
-        start, at = fit.states[fit.record.film == film][-1:], frames[0] - 1
+        earlier = (fit.record.film == film) & (fit.record.t < record.t[frames[0]])
+        start, at = fit.states[earlier][-1:], frames[0] - 1
         if not len(start):
             at = _settled(record, frames, window)
             _first, start = _filtered(fit, record, np.array([[frames[0], at]]))
@@ -430,6 +433,8 @@ def _interval(
     blocks: NDArray[np.int64], columns: Array, measure: Callable[..., Array], rng: np.random.Generator
 ) -> tuple[float, float]:
     """Compute the 95 % interval of a statistic of columns (n, c), over resampled blocks."""
+    observed = np.isfinite(columns).any(axis=1)
+    blocks, columns = blocks[observed], columns[observed]
     numbers, counts = np.unique(blocks, return_counts=True)
     if len(numbers) < _FEWEST:
         return float("nan"), float("nan")
