@@ -135,6 +135,8 @@ def test_a_wider_law_is_a_rival_only_if_it_gains():
     chosen = hypothesis(100.0, QUADRATIC)
     wider = hypothesis(97.0, QUADRATIC, COULOMB)
     assert rivals(chosen, [wider], KNOWN) == []
+    little = hypothesis(100.4, QUADRATIC, COULOMB)
+    assert rivals(chosen, [little], KNOWN) == []
     gains = hypothesis(101.0, QUADRATIC, COULOMB)
     assert rivals(chosen, [gains], KNOWN) == [gains]
 

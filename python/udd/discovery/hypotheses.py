@@ -254,7 +254,9 @@ def rivals(
                 result.append(other)
             continue
         wider = other.constants > chosen.constants
-        if wider and other.log_z <= chosen.log_z and contains(other, chosen, known_parameters):
+        # Without the rounding, drag above 0.16 rad/s is a rival of quadratic drag: it gains 0.01 nats.
+        gains = round(other.log_z - chosen.log_z) > 0
+        if wider and not gains and contains(other, chosen, known_parameters):
             continue
         if other.trial.formula is not None and any(
             contains(law, other, known_parameters)

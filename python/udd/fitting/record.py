@@ -215,8 +215,8 @@ def _record_of(measurement: Measurement, model: Any, state0: Any, alone: bool) -
         given = ", ".join(measurement.names)
         hint = ": a pendulum with a gyroscope is udd.Pendulum(...).with_gyroscope()"
         raise FitError(
-            f"the measurement has columns {given}, which are neither a disk's nor a pendulum's"
-            f"{hint if 'Omega' in measurement.names else ''}"
+            f"the measurement has columns {given}, which are neither a disk's (Y, Z, beta) nor a pendulum's "
+            f"(theta){hint if 'Omega' in measurement.names else ''}"
         )
     if formula_model and formula_model.inputs:
         (formula_model,) = driven((formula_model,), (measurement,))
