@@ -273,7 +273,7 @@ def added(effect: udd.effects.Effect, **more: Any) -> AddedEffect:
     return AddedEffect(**(values | more))
 
 
-def final(*, missing: bool = False, **values: tuple[float, float]) -> Any:
+def final(*, tight: bool = True, **values: tuple[float, float]) -> Any:
     """A fit of which only the numbers count."""
     order = {name.replace("__", "."): value for name, (value, _sd) in values.items()}
     covariance = np.diag([sd**2 for _value, sd in values.values()])
@@ -286,7 +286,7 @@ def final(*, missing: bool = False, **values: tuple[float, float]) -> Any:
         model=udd.Disk(0.04),
         record=record,
         states=states,
-        doubts=SimpleNamespace(missing=missing),
+        doubts=SimpleNamespace(tight=tight),
         widened=1.0,
     )
 
@@ -372,7 +372,7 @@ def test_each_doubt_leaves_the_form_open(monkeypatch):
     assert "no law of one term" in doubts_of([added(effect, is_law=False)], numbers, gain, 1000)[0]
     weak = final(quadratic_drag__c=(0.01, 0.01))
     assert "do not determine c" in doubts_of([clear], weak, gain, 1000)[0]
-    unclear = final(missing=True, quadratic_drag__c=(0.01, 0.001))
+    unclear = final(tight=False, quadratic_drag__c=(0.01, 0.001))
     assert "something else is missing" in doubts_of([clear], unclear, gain, 1000)[0]
     # Where free runs gain little the frames' own likelihood may show it: 1000 numbers at half their cost.
     assert doubts_of([clear], numbers, (0.99, 0.98, 1.01), 1000) == []

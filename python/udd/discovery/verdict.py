@@ -70,8 +70,8 @@ def doubts_of(added: Sequence[AddedEffect], final: Fit, ratio: Ratio, held_out: 
     if any(effect.curve is not None for effect in added) and any(effect.coarse for effect in readings(final)):
         result.append("A sensor reads in coarse steps, and such errors make curves too.")
     # Without this a friction over 1 + (Omega/s)^2 is identified as one that saturates with the speed.
-    if added and final.doubts.missing:
-        result.append("The residuals show that something else is missing.")
+    if added and not final.doubts.tight:
+        result.append("The model still needs a random force: something else is missing.")
     if added and not has_size(ratio) and not any(_predicts(effect.ratio, held_out) for effect in added):
         result.append("Held-out data gain less than 2 %, and less than 10 nats.")
     return result
