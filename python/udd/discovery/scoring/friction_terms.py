@@ -143,25 +143,26 @@ def further() -> tuple[FormulaSpec, ...]:
     """Describe frictions that the library lacks, each with a scanned number."""
     brake, size = (0.0, np.inf), (1e-3, np.inf)
 
-    def near(name: str, title: str, at: str, turn: str, along: str) -> FormulaSpec:
+    def at_angle(name: str, title: str, at: str, turn: str, along: str) -> FormulaSpec:
         ranges, names = {"a": brake, "s": size}, ("a", "c", "s")
         spec = written("torque", f"-a*({at})*{turn}", name, title, ["a"], ranges, names)
         a, c, s = spec.parameters
         width = replace(s, role="shape", grid=_ANGLES)
         return replace(spec, parameters=(a, replace(c, role="scanned", along=along), width))
 
-    def beyond(name: str, title: str, text: str) -> FormulaSpec:
+    def over_speed(name: str, title: str, text: str) -> FormulaSpec:
         spec = written("torque", text, name, title, ["a"], {"a": brake, "b": size}, ("a", "b"))
         a, b = spec.parameters
         return replace(spec, parameters=(a, replace(b, role="scanned", along="speed")))
 
     here, there = (f"exp(-(2*sin((beta {sign} c)/2)/s)^2)" for sign in "-+")
-    both = near("two_brakes", "friction near an angle on both sides", f"{here} + {there}", "Omega", "side")
+    title = "friction near an angle on both sides"
+    both = at_angle("two_brakes", title, f"{here} + {there}", "Omega", "side")
     return (
-        near("dry_brake", "dry friction near an angle", here, "tanh(Omega/0.05)", "angle"),
+        at_angle("dry_brake", "dry friction near an angle", here, "tanh(Omega/0.05)", "angle"),
         # Without this, two magnets at 1.4 and -1.4 rad are identified as one at -1.4 rad.
         replace(both, bodies=tuple(body for body in both.bodies if body == "pendulum")),
-        beyond("saturating", "friction that saturates with the speed", "-a*tanh(Omega/b)"),
+        over_speed("saturating", "friction that saturates with the speed", "-a*tanh(Omega/b)"),
         # Without this, a magnet's brake is identified as friction that saturates.
-        beyond("eddy_brake", "brake by eddy currents", "-a*Omega/(1 + (Omega/b)^2)"),
+        over_speed("eddy_brake", "brake by eddy currents", "-a*Omega/(1 + (Omega/b)^2)"),
     )
