@@ -192,13 +192,7 @@ fn fit(name: &'static str, frames: usize) -> Path {
     let mut model = DISK.to_vec();
     let free = [0, 3, 4].map(|j| {
         model[j] *= 1.05;
-        FreeParameter {
-            role: Role::Model(j),
-            film: None,
-            mean: DISK[j],
-            sd: f64::INFINITY,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-        }
+        FreeParameter::unlimited(Role::Model(j), DISK[j], f64::INFINITY)
     });
     let estimator = Estimator {
         family,

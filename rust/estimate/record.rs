@@ -79,6 +79,11 @@ pub struct FreeParameter {
 }
 
 impl FreeParameter {
+    /// A parameter that all films share and that may have any value.
+    pub fn unlimited(role: Role, mean: f64, sd: f64) -> Self {
+        Self { role, film: None, mean, sd, range: (f64::NEG_INFINITY, f64::INFINITY) }
+    }
+
     /// Returns `true` if the model is defined for a value.
     pub fn allows(&self, value: f64) -> bool {
         let (least, largest) = self.range;

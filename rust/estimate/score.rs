@@ -66,13 +66,7 @@ where
     ) -> ParameterJacobian {
         let wider = |model: &Vec<f64>| [model.as_slice(), &candidate.more].concat();
         let values: Vec<Vec<f64>> = point.sets.iter().map(|set| wider(&set.model)).collect();
-        let one = |&role: &Role| FreeParameter {
-            role,
-            film: None,
-            mean: 0.0,
-            sd: f64::INFINITY,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-        };
+        let one = |&role: &Role| FreeParameter::unlimited(role, 0.0, f64::INFINITY);
         let free: Vec<FreeParameter> = candidate.amplitudes.iter().map(one).collect();
         self.columns(point, places, (&candidate.family, &values), &free, origin)
     }

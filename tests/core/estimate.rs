@@ -73,10 +73,8 @@ fn problem(family: DiskFamily, record: Record<3>, free: Vec<FreeParameter>) -> P
     Estimator { family, sensor: DiskCamera, record, free, diffusion, tolerance, known: None }
 }
 
-const UNLIMITED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-
 fn free(role: Role, mean: f64, sd: f64) -> FreeParameter {
-    FreeParameter { role, film: None, mean, sd, range: UNLIMITED }
+    FreeParameter::unlimited(role, mean, sd)
 }
 
 /// One film's point.

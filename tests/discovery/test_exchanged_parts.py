@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 import udd
 from discovered import in_air
-from udd.discovery.search_data import prepared
+from udd.discovery.search_data import known_model_fits, prepared
 from udd.discovery.validation.held_out_errors import held_out_errors
 from udd.fitting import fit_record
 from udd.report.discovery_report import held_back
@@ -34,6 +37,26 @@ def test_free_runs_over_the_first_part_start_there():
     errors = held_out_errors(fitted, data.record, ~data.train)
     assert errors.whole < 3 * 2e-3  # of a right model: the noise, and that of the start
     assert errors.median[-1] < 3 * errors.floor[-1]
+
+
+def test_the_last_part_keeps_its_name_if_the_disk_comes_to_rest():
+    """The frames at rest are no part of the record: its end is before the film's."""
+    trained = SimpleNamespace(record=SimpleNamespace(clock=[0.0]))
+    film = SimpleNamespace(t=[0.0, 100.0], duration=100.0)
+    result: Any = SimpleNamespace(measurement=film, held_out=(), held_out_span=(50.0, 80.0), trained=trained)
+    assert held_back(result) == "The last 30 % of the record"
+
+
+def test_undetermined_parameters_are_named_again_with_the_parts_exchanged():
+    """A record of an oscillator determines only the product of two factors."""
+    t = np.arange(0, 20, 0.05)
+    seen = np.cos(2 * t) + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    model = udd.Model(["x", "v"], ["v", "-a*b*x"], {"a": 2.0, "b": 2.0})
+    options = {"free": None, "camera": True, "priors": None, "each": None}
+    data = prepared(udd.Measurement(t, {"x": seen}), model, None, None, 0.6)
+    first = known_model_fits(data, options)[2]
+    assert first and known_model_fits(data.exchanged(0.6), options)[2] == first
+    assert options["priors"] is None
 
 
 @pytest.mark.slow

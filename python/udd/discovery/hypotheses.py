@@ -199,20 +199,22 @@ def named(order: Sequence[Hypothesis], known_parameters: Sequence[str]) -> list[
     for other in order[1:]:
         is_close = other.trial.curve is None and other.log_z > first.log_z - EVIDENCE_MARGIN
         if is_close and other.constants <= first.constants and contains(other, first, known_parameters):
-            return [other, *(h for h in order if h is not other)]
+            return _led_by(other, order)
     return list(order)
 
 
 def simplest(order: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Put a hypothesis first if the leading one only adds effects to it, and gains less than ten nats."""
     # Without this, a disk with drag above 4 rad/s gets a negative cubic drag, too.
-    for other in order[1:]:
-        adds = {c.effect.name for c in other.trial.candidates} < {
-            c.effect.name for c in order[0].trial.candidates
-        }
-        if adds and other.log_z > order[0].log_z - EVIDENCE_MARGIN:
-            return [other, *(h for h in order if h is not other)]
+    names = [{c.effect.name for c in h.trial.candidates} for h in order]
+    for other, its_names in zip(order, names, strict=True):
+        if its_names < names[0] and other.log_z > order[0].log_z - EVIDENCE_MARGIN:
+            return _led_by(other, order)
     return list(order)
+
+
+def _led_by(first: Hypothesis, order: Sequence[Hypothesis]) -> list[Hypothesis]:
+    return [first, *(h for h in order if h is not first)]
 
 
 def lead(chosen: Hypothesis, other: Hypothesis) -> float:
@@ -228,12 +230,11 @@ def lead(chosen: Hypothesis, other: Hypothesis) -> float:
 
 def _doubts_the_coordinate(chosen: Hypothesis, other: Hypothesis) -> bool:
     """Return True for a spline over another coordinate than a formula's."""
-    if chosen.trial.formula is None or not other.trial.is_curve:
+    curve, spline = chosen.trial.curve, other.trial.curve
+    if chosen.trial.formula is None or not other.trial.is_curve or curve is None or spline is None:
         return False
-    coordinates = [
-        {c.name.strip("|") for c in h.trial.curve.coordinates} for h in (chosen, other) if h.trial.curve
-    ]
-    return coordinates[0] != coordinates[1]
+    over, rather = ({c.name.strip("|") for c in located.coordinates} for located in (curve, spline))
+    return over != rather
 
 
 def rivals(

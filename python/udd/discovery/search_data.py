@@ -91,6 +91,7 @@ def known_model_fits(
 ) -> tuple[Fit, Fit, dict[str, tuple[float, float]]]:
     """Fit the known model to both parts; also return priors of parameters that these do not determine."""
     constrained: dict[str, tuple[float, float]] = {}
+    options = dict(options)  # a search may ask again with the parts exchanged
     stated_priors = dict(options["priors"] or {})
 
     def fit(some: Record) -> Fit:

@@ -177,34 +177,33 @@ def fit_record(
     start = start_point(models, measurements, record)
     if search and models[0].inputs:  # a fit finds the model error itself
         problem = _with_input_noise(problem, start)
-    return solve_with_noise(problem, start) if search else _shapes_last(problem, start)
+    return solve_with_noise(problem, start) if search else _most_probable_end(problem, start)
 
 
-def _shapes_last(problem: Problem, start: Point) -> Fit:
-    """Fit with all parameters free; if that ends badly, also with the shapes of effects freed at the end.
-
-    A large model error hardly determines a shape: the first steps may lead far away from a good start.
-    """
-    result, failure = None, None
-    try:
-        result = solve_with_noise(problem, start)
-    except SolveError as error:
-        failure = error
+def _most_probable_end(problem: Problem, start: Point) -> Fit:
+    """Fit with all parameters free; if that ends badly, also with the shapes of effects freed at the end."""
     names = {name for model in problem.models for name in shapes(model)}
-    first = tuple(f for f in problem.free if f.base not in names)
-    if len(first) < len(problem.free) and not (result and result.problem.has_smallest_model_error):
+    early = tuple(f for f in problem.free if f.base not in names)
+
+    def shapes_last(problem: Problem, start: Point) -> Fit:
+        held = solve_with_noise(replace(problem, free=early), start)
+        left = replace(problem, schedule=problem.schedule[held.level :])
+        result = solve_with_noise(left, held.point)
+        return replace(result, problem=replace(result.problem, schedule=problem.schedule))
+
+    fits: list[Fit] = []
+    failures: list[SolveError] = []
+    # A large model error hardly determines a shape: the first steps may lead far away from a good start.
+    for work in (solve_with_noise, shapes_last) if len(early) < len(problem.free) else (solve_with_noise,):
         try:
-            held = solve_with_noise(replace(problem, free=first), start)
-            left = replace(problem, schedule=problem.schedule[held.level :])
-            again = solve_with_noise(left, held.point)
-            if result is None or again.evidence > result.evidence:
-                return replace(again, problem=replace(again.problem, schedule=problem.schedule))
-        except SolveError:
-            pass
-    if result is None:
-        assert failure is not None
-        raise failure
-    return result
+            fits.append(work(problem, start))
+        except SolveError as error:
+            failures.append(error)
+        if fits and fits[-1].problem.has_smallest_model_error:
+            break
+    if not fits:
+        raise failures[0]
+    return max(fits, key=lambda fitted: fitted.evidence)
 
 
 def _with_input_noise(problem: Problem, start: Point) -> Problem:

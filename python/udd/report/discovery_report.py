@@ -183,7 +183,7 @@ def held_back(discovery: Discovery) -> str:
     if discovery.held_out:
         return f"Whole records, by number {', '.join(map(str, discovery.held_out))},"
     begin, end = discovery.held_out_span
-    which = "first" if end < m.t[-1] else "last"
+    which = "first" if begin < discovery.trained.record.clock[0] else "last"
     return f"The {which} {100 * (end - begin) / m.duration:.0f} % of the record"
 
 
